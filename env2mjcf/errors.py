@@ -1,0 +1,180 @@
+"""Exceptions, and the diagnostics that explain them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NoReturn
+
+
+class Severity(StrEnum):
+    """How much a diagnostic matters."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A piece of one line of a source file.
+
+    Attributes:
+        path: The file, as it was named by the caller.
+        line: Line number, from 1.
+        column: Column of the first character, from 1.
+        length: Number of characters, at least 1; a span never leaves its line.
+        text: The whole source line without its line end.
+    """
+
+    path: str
+    line: int
+    column: int
+    length: int = 1
+    text: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}:{self.column}"
+
+    def excerpt(self) -> str:
+        """Return the source line with a caret line under it."""
+        # Tabs stay tabs in the caret line, so that the caret stands under its column.
+        indent = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
+        length = max(1, min(self.length, len(self.text) - self.column + 1))
+        return f"    {self.text}\n    {indent}{'^' * length}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding about an input: what was found, where, and what to do.
+
+    Attributes:
+        code: Stable code, listed with its meaning in `env2mjcf.diagnostics.CATALOGUE`.
+        severity: How much it matters.
+        subject: What it is about: a body, a mesh file, a connection.
+        message: What was found and what was expected.
+        hint: What to do about it; may be empty.
+        span: Where in the source, if it has a place.
+    """
+
+    code: str
+    severity: Severity
+    subject: str
+    message: str
+    hint: str = ""
+    span: Span | None = None
+
+    def __str__(self) -> str:
+        place = f"{self.span}: " if self.span else ""
+        lines = [f"{place}{self.severity} {self.code}: {self.message}"]
+        if self.span and self.span.text:
+            lines.append(self.span.excerpt())
+        if self.hint:
+            lines.append(f"    hint: {self.hint}")
+        return "\n".join(lines)
+
+
+class Env2MjcfError(Exception):
+    """Base of every error that env2mjcf raises on bad input.
+
+    Attributes:
+        diagnostic: The finding that stopped the work.
+        diagnostics: All findings up to it, itself last.
+    """
+
+    def __init__(self, diagnostic: Diagnostic, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        super().__init__(str(diagnostic))
+        self.diagnostic = diagnostic
+        self.diagnostics = (*diagnostics, diagnostic)
+
+    @property
+    def code(self) -> str:
+        """The stable code of the finding."""
+        return self.diagnostic.code
+
+    @property
+    def span(self) -> Span | None:
+        """Where in the source it was found."""
+        return self.diagnostic.span
+
+    def __reduce__(self) -> tuple[type[Env2MjcfError], tuple[Diagnostic, tuple[Diagnostic, ...]]]:
+        return type(self), (self.diagnostic, self.diagnostics[:-1])
+
+
+class FormatError(Env2MjcfError):
+    """A text file (env, robot, XML, query) that cannot be read."""
+
+
+class GeometryError(Env2MjcfError):
+    """A mesh that is missing, unreadable or unusable."""
+
+
+class KinematicsError(Env2MjcfError):
+    """Bodies and connections that do not make a robot."""
+
+
+class ConversionError(Env2MjcfError):
+    """A scene that cannot be expressed in, or is refused by, MuJoCo; or output that cannot be written."""
+
+
+class DiagnosticLog:
+    """Collects diagnostics; in strict mode the first warning is raised as an error.
+
+    Args:
+        strict: Whether warnings are errors.
+    """
+
+    def __init__(self, strict: bool = False) -> None:
+        self.strict = strict
+        self._items: list[Diagnostic] = []
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
+        """Add findings that an earlier stage has already judged."""
+        self._items.extend(diagnostics)
+
+    def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
+        """Record something worth knowing that is no fault."""
+        self._items.append(Diagnostic(code, Severity.INFO, subject, message, hint, span))
+
+    def warn(
+        self,
+        kind: type[Env2MjcfError],
+        code: str,
+        subject: str,
+        message: str,
+        *,
+        hint: str = "",
+        span: Span | None = None,
+    ) -> None:
+        """Record something doubtful; raise it as `kind` in strict mode."""
+        if self.strict:
+            self.fail(kind, code, subject, message, hint=hint, span=span)
+        self._items.append(Diagnostic(code, Severity.WARNING, subject, message, hint, span))
+
+    def fail(
+        self,
+        kind: type[Env2MjcfError],
+        code: str,
+        subject: str,
+        message: str,
+        *,
+        hint: str = "",
+        span: Span | None = None,
+    ) -> NoReturn:
+        """Raise a fault as `kind`, with everything recorded before it."""
+        raise kind(Diagnostic(code, Severity.ERROR, subject, message, hint, span), tuple(self._items))
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return `did you mean 'x'?` for the nearest known word, else an empty string."""
+    by_folded = {k.lower(): k for k in known}
+    near = difflib.get_close_matches(word.lower(), by_folded, n=1, cutoff=0.6)
+    return f"did you mean {by_folded[near[0]]!r}?" if near else ""
