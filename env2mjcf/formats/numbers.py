@@ -1,0 +1,174 @@
+"""Files that are nothing but numbers: found all at once, each with its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Span
+
+_NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_LINE_END = re.compile(rb"\r\n|\r|\n")
+_LINE = re.compile(rb"[^\r\n]+")
+
+# Converted piece by piece, so that the text of all numbers never lies in memory at once.
+_CHUNK = 1 << 16
+# Longer lines are not quoted: a file without line ends would be quoted whole.
+_LONGEST_QUOTE = 400
+
+
+def _table(characters: bytes) -> NDArray[np.bool_]:
+    table = np.zeros(256, dtype=bool)
+    table[np.frombuffer(characters, dtype=np.uint8)] = True
+    return table
+
+
+_BLANK = _table(b" \t\n\v\f\r")
+# Neither letters of `nan` and `inf` nor the underscore that Python allows in numbers.
+_NUMERIC = _table(b" \t\n\v\f\r0123456789+-.eE")
+_SIGN = _table(b"+-")
+_EXPONENT = _table(b"eE")
+_FRACTION = _table(b".eE")
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The numbers of a text.
+
+    Attributes:
+        data: The text.
+        starts: Offset of each token in `data`.
+        values: Value of each token; shorter than `starts` where a token is not a finite number, which is then
+            token `len(values)`.
+    """
+
+    data: bytes
+    starts: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every token is a finite number."""
+        return len(self.values) == len(self.starts)
+
+    def extent(self, token: int) -> tuple[int, int]:
+        """Return the offsets at which a token begins and ends."""
+        start = int(self.starts[token])
+        limit = int(self.starts[token + 1]) if token + 1 < len(self.starts) else len(self.data)
+        return start, start + len(self.data[start:limit].rstrip())
+
+    def text(self, token: int) -> str:
+        """Return a token as it stands in the text."""
+        start, end = self.extent(token)
+        return self.data[start:end].decode("latin-1")
+
+    def first_fraction(self, first: int, last: int) -> int | None:
+        """Return the first of the tokens `first` to `last - 1` that is not written as an integer."""
+        if first >= last:
+            return None
+        start, end = int(self.starts[first]), self.extent(last - 1)[1]
+        hits = np.flatnonzero(_FRACTION[np.frombuffer(self.data, np.uint8)[start:end]])
+        return int(np.searchsorted(self.starts, start + hits[0], side="right")) - 1 if len(hits) else None
+
+
+def find_numbers(data: bytes, *, fortran: bool = False) -> Numbers:
+    """Find all numbers of a text.
+
+    Args:
+        data: Numbers with blanks between them.
+        fortran: Accept what Fortran prints: exponents with `D`, and no blank in front of a sign.
+    """
+    if fortran:
+        data = data.translate(bytes.maketrans(b"dD", b"eE"))
+    chars = np.frombuffer(data, dtype=np.uint8)
+    blank = _BLANK[chars]
+    first = ~blank
+    first[1:] &= blank[:-1]
+    text = data
+    if fortran and len(chars):
+        glued = _SIGN[chars[1:]] & ~blank[:-1] & ~_EXPONENT[chars[:-1]]
+        first[1:] |= glued
+        text = np.insert(chars, np.flatnonzero(glued) + 1, ord(" ")).tobytes() if glued.any() else data
+    starts = np.flatnonzero(first).astype(np.int64)
+    plain = bool(_NUMERIC[chars].all())
+    values: list[NDArray[np.float64]] = []
+    for chunk in _token_chunks(text):
+        converted = _converted(chunk, plain)
+        values.append(converted)
+        if len(converted) < len(chunk):
+            break
+    return Numbers(data, starts, np.concatenate(values) if values else np.empty(0))
+
+
+def _token_chunks(text: bytes) -> Iterator[list[bytes]]:
+    rest = text
+    while rest:
+        pieces = rest.split(None, _CHUNK)
+        rest = pieces.pop() if len(pieces) > _CHUNK else b""
+        yield pieces
+
+
+def _converted(tokens: list[bytes], plain: bool) -> NDArray[np.float64]:
+    """Return the values of the tokens in front of the first that is no finite number."""
+    if plain:
+        try:
+            values = np.array(tokens, dtype=np.float64)
+        except ValueError:
+            values = None
+        if values is not None and np.isfinite(values).all():
+            return values
+    good: list[float] = []
+    for token in tokens:
+        if not _NUMBER.fullmatch(token) or abs(float(token)) == float("inf"):
+            break
+        good.append(float(token))
+    return np.array(good, dtype=np.float64)
+
+
+def span_of(path: str, data: bytes, start: int, end: int) -> Span:
+    """Return the place of `data[start:end]`, which lies within one line."""
+    head = data[:start]
+    begin = max(head.rfind(b"\n"), head.rfind(b"\r")) + 1
+    line = len(_LINE_END.findall(head)) + 1
+    match = _LINE.match(data, begin)
+    text = match.group().decode("utf-8", "replace") if match else ""
+    column = len(data[begin:start].decode("utf-8", "replace")) + 1
+    return Span(path, line, column, max(1, end - start), text if len(text) <= _LONGEST_QUOTE else "")
+
+
+def column_layouts(data: bytes) -> Iterator[bytes]:
+    """Guess where numbers printed in columns of fixed width touch, and return the text with blanks between them.
+
+    Fortran's `10I6` prints 100000 100001 as `100000100001`. Lines of integers have one width, lines of other
+    numbers another. Each pair of widths that every line fits gives one text; the widths of MOVIE.BYU come first.
+    """
+    lines = _LINE_END.split(data)
+    integers = [line for line in lines if line.strip() and not re.search(rb"[.eEdD]", line)]
+    others = [line for line in lines if re.search(rb"[.eEdD]", line)]
+    for integer_width in _widths(integers, (8, 6, 10, 5, 7, 9, 12)):
+        for other_width in _widths(others, (12, 10, 13, 14, 15, 16, 20, 8)):
+            yield b"\n".join(
+                _in_columns(line, other_width if re.search(rb"[.eEdD]", line) else integer_width) for line in lines
+            )
+
+
+def _widths(lines: list[bytes], candidates: tuple[int, ...]) -> Iterator[int]:
+    """Yield the widths into which every line can be cut; 0, which cuts nothing, for the last."""
+    for width in candidates:
+        if lines and all(
+            len(line.rstrip()) % width == 0 and all(_NUMBER.fullmatch(x) for x in _in_columns(line, width).split())
+            for line in lines
+        ):
+            yield width
+    yield 0
+
+
+def _in_columns(line: bytes, width: int) -> bytes:
+    return b" ".join(line[i : i + width] for i in range(0, len(line), width)) if width else line
