@@ -13,10 +13,14 @@ from ..errors import Span
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
+_FIELD = re.compile(rb" *[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_POINT = re.compile(rb"[.eEdD]")
+_D_TO_E = bytes.maketrans(b"dD", b"eE")
 _LINE = re.compile(rb"[^\r\n]+")
+_BLANKS = re.compile(rb"\s")
 
-# Converted piece by piece, so that the text of all numbers never lies in memory at once.
-_CHUNK = 1 << 16
+# Bytes that are split into words at once, so that the words of a large file never lie in memory together.
+_CHUNK = 1 << 20
 # Longer lines are not quoted: a file without line ends would be quoted whole.
 _LONGEST_QUOTE = 400
 
@@ -32,7 +36,7 @@ _BLANK = _table(b" \t\n\v\f\r")
 _NUMERIC = _table(b" \t\n\v\f\r0123456789+-.eE")
 _SIGN = _table(b"+-")
 _EXPONENT = _table(b"eE")
-_FRACTION = _table(b".eE")
+_FRACTION = _table(b".eEdD")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,17 +89,17 @@ def find_numbers(data: bytes, *, fortran: bool = False) -> Numbers:
         data: Numbers with blanks between them.
         fortran: Accept what Fortran prints: exponents with `D`, and no blank in front of a sign.
     """
-    if fortran:
-        data = data.translate(bytes.maketrans(b"dD", b"eE"))
-    chars = np.frombuffer(data, dtype=np.uint8)
+    # One letter for another, so that offsets stay those of `data`.
+    text = data.translate(_D_TO_E) if fortran else data
+    chars = np.frombuffer(text, dtype=np.uint8)
     blank = _BLANK[chars]
     first = ~blank
     first[1:] &= blank[:-1]
-    text = data
     if fortran and len(chars):
         glued = _SIGN[chars[1:]] & ~blank[:-1] & ~_EXPONENT[chars[:-1]]
         first[1:] |= glued
-        text = np.insert(chars, np.flatnonzero(glued) + 1, ord(" ")).tobytes() if glued.any() else data
+        if glued.any():
+            text = np.insert(chars, np.flatnonzero(glued) + 1, ord(" ")).tobytes()
     starts = np.flatnonzero(first).astype(np.int64)
     plain = bool(_NUMERIC[chars].all())
     values: list[NDArray[np.float64]] = []
@@ -108,11 +112,12 @@ def find_numbers(data: bytes, *, fortran: bool = False) -> Numbers:
 
 
 def _token_chunks(text: bytes) -> Iterator[list[bytes]]:
-    rest = text
-    while rest:
-        pieces = rest.split(None, _CHUNK)
-        rest = pieces.pop() if len(pieces) > _CHUNK else b""
-        yield pieces
+    at = 0
+    while at < len(text):
+        blank = _BLANKS.search(text, at + _CHUNK)
+        end = blank.start() if blank else len(text)
+        yield text[at:end].split()
+        at = end
 
 
 def _converted(tokens: list[bytes], plain: bool) -> NDArray[np.float64]:
@@ -144,31 +149,33 @@ def span_of(path: str, data: bytes, start: int, end: int) -> Span:
 
 
 def column_layouts(data: bytes) -> Iterator[bytes]:
-    """Guess where numbers printed in columns of fixed width touch, and return the text with blanks between them.
+    """Guess where numbers printed in columns of fixed width touch, and yield the text with blanks between them.
 
     Fortran's `10I6` prints 100000 100001 as `100000100001`. Lines of integers have one width, lines of other
     numbers another. Each pair of widths that every line fits gives one text; the widths of MOVIE.BYU come first.
     """
     lines = _LINE_END.split(data)
-    integers = [line for line in lines if line.strip() and not re.search(rb"[.eEdD]", line)]
-    others = [line for line in lines if re.search(rb"[.eEdD]", line)]
+    integers = [line for line in lines if line.strip() and not _POINT.search(line)]
+    others = [line for line in lines if _POINT.search(line)]
     for integer_width in _widths(integers, (8, 6, 10, 5, 7, 9, 12)):
         for other_width in _widths(others, (12, 10, 13, 14, 15, 16, 20, 8)):
-            yield b"\n".join(
-                _in_columns(line, other_width if re.search(rb"[.eEdD]", line) else integer_width) for line in lines
-            )
+            if integer_width or other_width:
+                yield b"\n".join(
+                    b" ".join(_columns(x, other_width if _POINT.search(x) else integer_width)) for x in lines
+                )
 
 
 def _widths(lines: list[bytes], candidates: tuple[int, ...]) -> Iterator[int]:
-    """Yield the widths into which every line can be cut; 0, which cuts nothing, for the last."""
+    """Yield the widths of which every line is made; last 0, which cuts nothing."""
     for width in candidates:
-        if lines and all(
-            len(line.rstrip()) % width == 0 and all(_NUMBER.fullmatch(x) for x in _in_columns(line, width).split())
-            for line in lines
-        ):
+        if lines and all(all(_FIELD.fullmatch(field) for field in _columns(line, width)) for line in lines):
             yield width
     yield 0
 
 
-def _in_columns(line: bytes, width: int) -> bytes:
-    return b" ".join(line[i : i + width] for i in range(0, len(line), width)) if width else line
+def _columns(line: bytes, width: int) -> list[bytes]:
+    line = line.rstrip()
+    # Fortran aligns to the right, so that a line's length without trailing blanks is a multiple of the width.
+    if width and len(line) % width:
+        return [line]
+    return [line[i : i + width] for i in range(0, len(line), width)] if width else [line]
