@@ -1,3 +1,62 @@
 """Motion-planning environments of the Parasol Lab in MuJoCo: read, convert, load, simulate, query contacts."""
 
-from .formats import read as read
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import ConversionError as ConversionError
+from .errors import Diagnostic as Diagnostic
+from .errors import Env2MjcfError as Env2MjcfError
+from .errors import FormatError as FormatError
+from .errors import GeometryError as GeometryError
+from .errors import KinematicsError as KinematicsError
+from .errors import Severity as Severity
+from .errors import Span as Span
+from .formats import byu as _byu
+from .formats.reading import read as read
+from .model import Environment as Environment
+from .options import Limits as Limits
+from .options import Options as Options
+
+if TYPE_CHECKING:
+    from .contact.types import Contact as Contact
+    from .contact.types import PathReport as PathReport
+    from .conversion import Conversion as Conversion
+    from .conversion import convert as convert
+    from .report import Report as Report
+    from .simulation.preparing import load as load
+    from .simulation.scene import Query as Query
+    from .simulation.scene import Scene as Scene
+    from .space import ConfigurationSpace as ConfigurationSpace
+
+# These need MuJoCo, which reading does not: they are imported when they are first used.
+_LAZY = {
+    "Contact": ".contact.types",
+    "PathReport": ".contact.types",
+    "Conversion": ".conversion",
+    "convert": ".conversion",
+    "Report": ".report",
+    "load": ".simulation.preparing",
+    "Query": ".simulation.scene",
+    "Scene": ".simulation.scene",
+    "ConfigurationSpace": ".space",
+}
+
+_byu.register()
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        value = getattr(import_module(_LAZY[name], __name__), name)
+        globals()[name] = value
+        return value
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(__name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY, "__version__"} - {"annotations"})

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .dofs import Dof, DofKind, Tree, build_tree, degrees_of_freedom
 from .errors import DiagnosticLog, KinematicsError
-from .model import BaseKind, Dialect, MultiBody, Pose
+from .model import BaseKind, DHForm, Dialect, MultiBody, Pose
 from .transforms import Array, dh_matrix, inverse, pose_matrix, rotation_matrix, transform, wrap
 
 _ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
@@ -78,6 +78,25 @@ class RobotKinematics:
         )
         row = dh_matrix(self.multibody.dh_form, alpha, dh.a, d, theta)
         return pose_matrix(connection.to_dh) @ row @ pose_matrix(connection.to_body)
+
+    def joint_frames(self, k: int, q: ArrayLike) -> dict[DofKind, Array]:
+        """Return where each elementary motion of a connection acts, (4, 4) in its previous body's frame, for one q.
+
+        Theta turns about z and d slides along z of its frame, alpha turns about x.
+        """
+        values = np.asarray(q, dtype=np.float64)
+        connection, dh = self.multibody.connections[k], self.multibody.connections[k].dh
+        alpha = float(self._value(k, DofKind.ALPHA, values, dh.alpha))
+        theta = float(self._value(k, DofKind.THETA, values, dh.theta))
+        d = float(self._value(k, DofKind.D, values, dh.d))
+        start = pose_matrix(connection.to_dh)
+
+        def after(alpha: float, a: float, d: float, theta: float) -> Array:
+            return start @ dh_matrix(self.multibody.dh_form, alpha, a, d, theta)
+
+        if self.multibody.dh_form is DHForm.CRAIG:
+            return {DofKind.ALPHA: start, DofKind.THETA: after(alpha, dh.a, 0, 0), DofKind.D: after(alpha, dh.a, 0, theta)}
+        return {DofKind.THETA: start, DofKind.D: after(0, 0, 0, theta), DofKind.ALPHA: after(0, dh.a, d, theta)}
 
     def loop_gaps(self, q: ArrayLike, radii: Sequence[float]) -> Array:
         """Return how far each loop is from closed, (..., nloops).
@@ -164,9 +183,9 @@ class RobotKinematics:
     def _columns(self) -> dict[tuple[int, DofKind], int]:
         return {(d.connection, d.kind): i for i, d in enumerate(self.dofs) if d.connection is not None}
 
-    def _value(self, k: int, kind: DofKind, q: Array, default: float) -> ArrayLike:
+    def _value(self, k: int, kind: DofKind, q: Array, default: float) -> Array:
         column = self._columns.get((k, kind))
-        return default if column is None else q[..., column]
+        return np.float64(default) if column is None else q[..., column]
 
     def _arm(self, k: int, slide: Sequence[float]) -> float:
         """Length of the way from a connection's DH frame to the origin of its next body."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from importlib import import_module
 from typing import IO, Any, Protocol
 
 import numpy as np
@@ -23,10 +23,14 @@ class TriangleMesh(Protocol):
     """What can be exported: a `trimesh.Trimesh` or a `geometry.mesh.Mesh`."""
 
     @property
-    def vertices(self) -> NDArray[np.float64]: ...
+    def vertices(self) -> NDArray[np.float64]:
+        """(n, 3) coordinates."""
+        ...
 
     @property
-    def faces(self) -> NDArray[np.int64]: ...
+    def faces(self) -> NDArray[np.int64]:
+        """(m, 3) indices from 0."""
+        ...
 
 
 def read_byu(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -> MeshArrays:
@@ -86,7 +90,7 @@ def _read(file: NumberFile) -> MeshArrays:
     corners, counts, first = _polygons(file, 4 + 2 * parts + 3 * n_vertices, n_vertices, n_polygons)
     _check_header(file, n_edges, ranges.reshape(-1, 2), n_polygons, len(corners))
     starts = np.cumsum(counts) - counts
-    faces = faces_of(vertices, corners, counts, file.path, file.log, lambda k: file.span(first + int(starts[k])))
+    faces = faces_of(vertices, corners, counts, file.path, file.log, place=lambda k: file.span(first + int(starts[k])))
     return vertices, faces
 
 
@@ -109,7 +113,8 @@ def _polygons(
         file.fail(
             "GEO214",
             token,
-            f"{what(token)} is vertex {int(indices[bad[0]])}; expected 1 to {n_vertices}, negative at the last corner",
+            f"{what(token)} is vertex {file.numbers.text(token)}; expected 1 to {n_vertices}, "
+            "negative at the last corner",
         )
     if missing:
         file.need(last + 1, what)
@@ -124,17 +129,15 @@ def _polygons(
     return np.abs(indices) - 1, np.diff(ends[:n_polygons], prepend=-1), first
 
 
-def _check_header(
-    file: NumberFile, n_edges: int, ranges: NDArray[np.int64], n_polygons: int, n_corners: int
-) -> None:
+def _check_header(file: NumberFile, n_edges: int, ranges: NDArray[np.int64], n_polygons: int, n_corners: int) -> None:
     """Report what no reader used and real files get wrong, and parts, which dialect A's reader gets wrong."""
     if len(ranges) != 1:
         file.log.warn(
             GeometryError,
             "GEO219",
             file.path,
-            f"{len(ranges)} parts, read as one mesh; dialect A's planner reads one range whatever the header says, and so "
-            "misreads this file",
+            f"{len(ranges)} parts, read as one mesh; dialect A's planner reads one range whatever the header says, "
+            "and so misreads this file",
             hint="write the mesh as a single part",
             span=file.span(0),
         )
@@ -163,9 +166,9 @@ def load_byu(file_obj: IO[str] | IO[bytes], **kwargs: Any) -> dict[str, Any]:
     Returns:
         Keyword arguments of a `trimesh.Trimesh`: `vertices` and `faces`.
     """
-    name = getattr(file_obj, "name", None)
-    path = os.fspath(name) if isinstance(name, (str, os.PathLike)) else "<stream>"
-    vertices, faces = read_byu(file_obj.read(), str(path), DiagnosticLog(), Limits())
+    # Streams in memory have no name, those of file descriptors have a number.
+    path = str(getattr(file_obj, "name", "<stream>"))
+    vertices, faces = read_byu(file_obj.read(), path, DiagnosticLog(), Limits())
     return {"vertices": vertices, "faces": faces}
 
 
@@ -180,8 +183,8 @@ def export_byu(mesh: TriangleMesh) -> str:
 
 def register() -> None:
     """Teach trimesh the extension `.g`."""
-    from trimesh.exchange import export, load
-
+    # Imported by name: trimesh has type hints only in part, and no public table of exporters.
+    load: Any = import_module("trimesh.exchange.load")
+    export: Any = import_module("trimesh.exchange.export")
     load.mesh_loaders["g"] = load_byu
-    # trimesh has no public table of exporters.
-    export._mesh_exporters["g"] = export_byu  # pyright: ignore[reportPrivateUsage]
+    export._mesh_exporters["g"] = export_byu

@@ -70,11 +70,9 @@ class NumberFile:
         if good >= token:
             return
         if self.numbers.complete:
-            self.fail(
-                "GEO213", good, f"the file ends where {what(good)} was expected", hint="is the file cut off?"
-            )
+            self.fail("GEO213", good, f"the file ends where {what(good)} was expected", hint="is the file cut off?")
         found = self.numbers.text(good)
-        if found.lower().lstrip("+-")[:3] in ("nan", "inf") or found[-1:].isdigit() and "e" in found:
+        if found.lower().lstrip("+-")[:3] in ("nan", "inf") or (found[-1:].isdigit() and "e" in found.lower()):
             self.fail("GEO212", good, f"{what(good)} is {_short(found)}; expected a finite number")
         hint = "a file of numbers has no comments" if found.startswith(("#", "%", "/")) else ""
         if not found.isprintable():
@@ -94,14 +92,14 @@ class NumberFile:
         """Return a count of vertices or polygons, which must be positive and within the limits."""
         value = int(self.integers(token, token + 1, lambda _: what)[0])
         if value < 0:
-            self.fail("GEO216", token, f"{what} is {value}; expected a positive number")
+            self.fail("GEO216", token, f"{what} is {self.numbers.text(token)}; expected a positive number")
         if value == 0:
             self.fail("GEO210", token, f"{what} is 0: the mesh is empty", hint="expected at least one triangle")
         if value > self.limits.mesh_elements:
             self.fail(
                 "GEO209",
                 token,
-                f"{what} is {value}; at most {self.limits.mesh_elements} are read",
+                f"{what} is {self.numbers.text(token)}; at most {self.limits.mesh_elements} are read",
                 hint="raise limits=Limits(mesh_elements=...)",
             )
         return value
@@ -135,6 +133,7 @@ def faces_of(
     counts: NDArray[np.int64],
     path: str,
     log: DiagnosticLog,
+    *,
     place: Callable[[int], Span],
 ) -> NDArray[np.int64]:
     """Cut a file's polygons into triangles and say where they are more, or less, than triangles.

@@ -79,7 +79,9 @@ class Numbers:
             return None
         start, end = int(self.starts[first]), self.extent(last - 1)[1]
         hits = np.flatnonzero(_FRACTION[np.frombuffer(self.data, np.uint8)[start:end]])
-        return int(np.searchsorted(self.starts, start + hits[0], side="right")) - 1 if len(hits) else None
+        if not len(hits):
+            return None
+        return int(np.searchsorted(self.starts, start + int(hits[0]), side="right")) - 1
 
 
 def find_numbers(data: bytes, *, fortran: bool = False) -> Numbers:

@@ -24,7 +24,8 @@ def triangulate(vertices: Vectors, corners: Indices, counts: Indices) -> tuple[I
         counts: Number of corners of each polygon, at least 3.
 
     Returns:
-        (m, 3) triangles in the order of the polygons, and the polygons found to cross themselves, the rest of each cut as a fan.
+        (m, 3) triangles in the order of the polygons, and the polygons found to cross themselves, what was left of
+        each cut as a fan.
     """
     first_corner = np.cumsum(counts) - counts
     first_face = np.cumsum(counts - 2) - (counts - 2)
@@ -53,6 +54,9 @@ def _fan(n: int) -> Indices:
 
 def _flattened(points: Vectors) -> Vectors:
     """Project (k, n, 3) polygons onto their planes, scaled to size 1 and counter-clockwise: (k, n, 2)."""
+    # A power of two, which rounds nothing, so that the largest doubles do not overflow.
+    _, exponent = np.frexp(np.abs(points).max(axis=(1, 2), keepdims=True))
+    points = np.ldexp(points, -exponent)
     points = points - points[:, :1]
     size = np.abs(points).max(axis=(1, 2), keepdims=True)
     points = points / np.where(size > 0, size, 1.0)
@@ -82,18 +86,16 @@ def _clip_ears(points: Vectors) -> tuple[Indices, bool]:
     """Cut one (n, 2) polygon; return (n - 2, 3) positions, and False where it crosses itself."""
     ring = list(range(len(points)))
     triples: list[tuple[int, int, int]] = []
-    # A corner that touches an ear's border blocks it at first; polygons with holes cut in have no other ears.
-    for touching_blocks in (True, False):
-        at, misses = 0, 0
-        while len(ring) > 3 and misses < len(ring):
-            ear = (ring[at - 1], ring[at], ring[(at + 1) % len(ring)])
-            if _is_ear(points, ear, ring, touching_blocks):
-                triples.append(ear)
-                del ring[at]
-                # The corner before is the likeliest to have become an ear.
-                at, misses = (at - 1) % len(ring), 0
-            else:
-                at, misses = (at + 1) % len(ring), misses + 1
+    at, misses = 0, 0
+    while len(ring) > 3 and misses < len(ring):
+        ear = (ring[at - 1], ring[at], ring[(at + 1) % len(ring)])
+        if _is_ear(points, ear, ring):
+            triples.append(ear)
+            del ring[at]
+            # The corner before is the likeliest to have become an ear.
+            at, misses = (at - 1) % len(ring), 0
+        else:
+            at, misses = (at + 1) % len(ring), misses + 1
     rest = np.array(ring, dtype=np.int64)
     fan = rest[_fan(len(ring))]
     areas = _doubled_areas(points[fan])
@@ -102,7 +104,7 @@ def _clip_ears(points: Vectors) -> tuple[Indices, bool]:
     return np.concatenate([np.array(triples, dtype=np.int64).reshape(-1, 3), fan]), whole
 
 
-def _is_ear(points: Vectors, ear: tuple[int, int, int], ring: list[int], touching_blocks: bool) -> bool:
+def _is_ear(points: Vectors, ear: tuple[int, int, int], ring: list[int]) -> bool:
     triangle = points[list(ear)]
     if _doubled_areas(triangle[None])[0] <= _FLAT:
         return False
@@ -111,8 +113,8 @@ def _is_ear(points: Vectors, ear: tuple[int, int, int], ring: list[int], touchin
     sides = np.roll(triangle, -1, axis=0) - triangle
     offsets = others[:, None] - triangle[None]
     left = sides[:, 0] * offsets[..., 1] - sides[:, 1] * offsets[..., 0]
-    inside = left >= -_FLAT if touching_blocks else left > _FLAT
-    return not bool(inside.all(axis=1).any())
+    # A corner on the border blocks the ear, too; one at the same place does not, or polygons with holes had no ears.
+    return not bool((left >= -_FLAT).all(axis=1).any())
 
 
 def _doubled_areas(triangles: Vectors) -> Vectors:

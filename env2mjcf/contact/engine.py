@@ -1,0 +1,81 @@
+"""MuJoCo's own collision detection as an engine of verdicts and contacts."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..transforms import Array
+
+
+class MujocoEngine:
+    """Asks `mj_collision` about configurations.
+
+    The engine has a model of its own, in which only links and obstacles collide: ground and walls act in simulation
+    alone, and pairs that cannot move are decided elsewhere.
+
+    Args:
+        model: The scene's model.
+        owners: Name of the body that each collision geom belongs to.
+    """
+
+    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str]) -> None:
+        names = list(dict.fromkeys(owners.values()))
+        index = {n: i for i, n in enumerate(names)}
+        self._names = names
+        self._owner = np.full(model.ngeom, -1, dtype=np.int64)
+        for geom, owner in owners.items():
+            self._owner[model.geom(geom).id] = index[owner]
+        self._model = copy.copy(model)
+        self._model.geom_contype[self._owner < 0] = 0
+        self._model.geom_conaffinity[self._owner < 0] = 0
+        if self._model.npair:
+            self._model.pair_margin[:] = -mujoco.mjMAXVAL
+        # One contact is enough for a verdict, and for where two cells touch.
+        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+
+    def data(self) -> mujoco.MjData:
+        """Return scratch data for one thread."""
+        return mujoco.MjData(self._model)
+
+    def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
+        """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
+        model, kinematics, collision = self._model, mujoco.mj_kinematics, mujoco.mj_collision
+        hits = np.zeros(len(qpos), dtype=bool)
+        for i, row in enumerate(qpos):
+            data.qpos[:] = row
+            kinematics(model, data)
+            collision(model, data)
+            hits[i] = data.ncon > 0
+        return hits
+
+    def touching(self, qpos: Array, data: mujoco.MjData) -> Iterable[tuple[str, str, Array, Array, float]]:
+        """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        if not data.ncon:
+            return []
+        # Iterating data.contact costs more than the query itself.
+        contacts = data.contact
+        geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos.copy()
+        distances = contacts.dist.copy()
+        return [
+            (self._names[self._owner[a]], self._names[self._owner[b]], places[i], frames[i, :3], float(distances[i]))
+            for i, (a, b) in enumerate(geoms)
+        ]
+
+    def body_poses(self, qpos: Array, bodies: NDArray[np.int64], data: mujoco.MjData) -> Array:
+        """Return world poses (n, nbodies, 4, 4) out of MuJoCo's kinematics for qpos of shape (n, nq)."""
+        poses = np.zeros((len(qpos), len(bodies), 4, 4))
+        poses[..., 3, 3] = 1.0
+        for i, row in enumerate(qpos):
+            data.qpos[:] = row
+            mujoco.mj_kinematics(self._model, data)
+            poses[i, :, :3, :3] = data.xmat[bodies].reshape(-1, 3, 3)
+            poses[i, :, :3, 3] = data.xpos[bodies]
+        return poses

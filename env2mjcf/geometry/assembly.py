@@ -1,0 +1,242 @@
+"""Puts bodies, meshes, collision shapes and inertias together: all that the MJCF stage needs to know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import ConversionError, DiagnosticLog
+from ..kinematics import RobotKinematics
+from ..model import Body, Environment, JointType, MultiBody, Recentring
+from ..names import body_names
+from ..options import Options
+from ..transforms import Array
+from .analysis import Analysis, analyse, mesh_diagnostics
+from .inertia import Inertial, inertial
+from .loading import load_mesh
+from .mesh import Mesh
+from .resolve import resolve_all
+from .shapes import CollisionShape, collision_shape
+
+# Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
+_THICKNESS_PER_EXTENT = 5e-6
+
+# Extents in metres beyond which the unit of a file is doubtful.
+_PLAUSIBLE_EXTENT = (1e-3, 1e4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """One body with its geometry.
+
+    Attributes:
+        name: Unique name.
+        body: Its description.
+        pose: (4, 4) world pose at home.
+        mesh: In the body's frame, recentred and scaled.
+        analysis: What the mesh is like.
+        shape: Convex pieces for contact; None for a Surface body.
+        inertial: Mass, centre and moments; None for a static body.
+    """
+
+    name: str
+    body: Body
+    pose: Array
+    mesh: Mesh
+    analysis: Analysis
+    shape: CollisionShape | None
+    inertial: Inertial | None
+
+    @property
+    def radius(self) -> float:
+        """Greatest distance of a vertex from the body's origin."""
+        return float(np.linalg.norm(self.mesh.vertices, axis=1).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotParts:
+    """A robot with its geometry.
+
+    Attributes:
+        kinematics: What moves it.
+        home: (dim,) its configuration at home.
+        links: Its bodies in file order.
+    """
+
+    kinematics: RobotKinematics
+    home: Array
+    links: tuple[Part, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its bodies in file order."""
+        return tuple(p.name for p in self.links)
+
+    @property
+    def radius(self) -> float:
+        """The planner's bounding radius r_0 + 2 sum r_i (env-format section 10.4)."""
+        radii = [p.radius for p in self.links]
+        return radii[0] + 2 * sum(radii[1:])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assembly:
+    """A scene in metres and radians, with geometry.
+
+    Attributes:
+        environment: The scene, scaled to metres.
+        robots: In the order of `environment.robots`.
+        obstacles: Bodies that links are tested against, in file order.
+        surfaces: Bodies that are only drawn.
+        lower, upper: (3,) corners of the bounding box of all bodies at home; the boundary is not counted.
+    """
+
+    environment: Environment
+    robots: tuple[RobotParts, ...]
+    obstacles: tuple[Part, ...]
+    surfaces: tuple[Part, ...]
+    lower: Array
+    upper: Array
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of the bounding box: the unit of every tolerance (design: section 2)."""
+        return float(np.linalg.norm(self.upper - self.lower))
+
+    def parts(self) -> tuple[Part, ...]:
+        """Return all bodies: robots, obstacles, surfaces."""
+        return (*(p for r in self.robots for p in r.links), *self.obstacles, *self.surfaces)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Placed:
+    """A body whose place is known and whose collision shape is not."""
+
+    name: str
+    body: Body
+    pose: Array
+    mesh: Mesh
+
+
+def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> Assembly:
+    """Load every mesh of a scene and give each body its geometry.
+
+    Args:
+        environment: The scene, scaled to metres.
+        options: `collision`, `density`, `scale` and the folders are used.
+        log: Where findings go.
+
+    Raises:
+        GeometryError: Meshes are missing or unusable; one error names all the missing ones.
+        KinematicsError: The bodies of a robot do not hang together.
+        ConversionError: A joint cannot be expressed in MuJoCo.
+    """
+    _refuse_sma(environment, log)
+    meshes = _Meshes(environment, options, log)
+    names = body_names(environment)
+    placed: list[tuple[MultiBody, RobotKinematics, Array, list[_Placed]]] = []
+    for i, multibody in enumerate(environment.multibodies):
+        kinematics = RobotKinematics.of(multibody, log)
+        home = kinematics.home(log)
+        poses = kinematics.forward(home)
+        bodies = [
+            _Placed(name, body, pose, meshes.mesh(body))
+            for name, body, pose in zip(names[i], multibody.bodies, poses, strict=True)
+        ]
+        placed.append((multibody, kinematics, home, bodies))
+    lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies])
+    thickness = _THICKNESS_PER_EXTENT * float(np.linalg.norm(upper - lower))
+    _check_extent(environment, float(np.linalg.norm(upper - lower)), log)
+    robots: dict[int, RobotParts] = {}
+    obstacles: list[Part] = []
+    surfaces: list[Part] = []
+    for multibody, kinematics, home, bodies in placed:
+        if _is_one_of(multibody, environment.robots):
+            links = tuple(meshes.part(b, thickness, moves=True) for b in bodies)
+            robots[id(multibody)] = RobotParts(kinematics, home, links)
+        elif _is_one_of(multibody, environment.surfaces):
+            surfaces += [meshes.part(b, None, moves=False) for b in bodies]
+        else:
+            obstacles += [meshes.part(b, thickness, moves=False) for b in bodies]
+    ordered = tuple(robots[id(m)] for m in environment.robots)
+    return Assembly(environment, ordered, tuple(obstacles), tuple(surfaces), lower, upper)
+
+
+class _Meshes:
+    """Loads each mesh file once, and shapes each mesh once."""
+
+    def __init__(self, environment: Environment, options: Options, log: DiagnosticLog) -> None:
+        self._options = options
+        self._log = log
+        self._paths = resolve_all(environment, options, log)
+        self._raw: dict[Path, Mesh] = {}
+        self._meshes: dict[tuple[Path, Recentring], Mesh] = {}
+        self._analyses: dict[Mesh, Analysis] = {}
+        self._shapes: dict[Mesh, CollisionShape] = {}
+
+    def mesh(self, body: Body) -> Mesh:
+        """Return a body's mesh, recentred and scaled."""
+        path = self._paths[body.filename]
+        key = (path, body.recentring)
+        if key not in self._meshes:
+            if path not in self._raw:
+                self._raw[path] = load_mesh(path, self._log, self._options.limits)
+            self._meshes[key] = self._raw[path].recentred(body.recentring).scaled(self._options.scale)
+        return self._meshes[key]
+
+    def part(self, placed: _Placed, thickness: float | None, *, moves: bool) -> Part:
+        """Give a placed body its shape (none without a thickness) and its inertia (where it moves)."""
+        mesh, body, options = placed.mesh, placed.body, self._options
+        if mesh not in self._analyses:
+            self._analyses[mesh] = analyse(mesh)
+            mesh_diagnostics(mesh, self._analyses[mesh], self._log, body.filename, body.span)
+        analysis = self._analyses[mesh]
+        if thickness is not None and mesh not in self._shapes:
+            self._shapes[mesh] = collision_shape(
+                mesh, analysis, options.collision, thickness, self._log, body.filename, body.span
+            )
+        shape = None if thickness is None else self._shapes[mesh]
+        inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None
+        if inertia is not None and inertia.note:
+            self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
+        return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia)
+
+
+def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
+    for multibody in environment.multibodies:
+        for connection in multibody.connections:
+            if connection.joint is JointType.SMA:
+                log.fail(
+                    ConversionError, "KIN320", "SMAJoint",
+                    "an SMAJoint bends along its length, which no MuJoCo joint does; the scene reads, but does not convert",
+                    hint="replace it by Revolute joints", span=connection.span,
+                )  # fmt: skip
+
+
+def _is_one_of(multibody: MultiBody, group: Sequence[MultiBody]) -> bool:
+    return any(multibody is m for m in group)
+
+
+def _bounding_box(bodies: Sequence[_Placed]) -> tuple[Array, Array]:
+    """Return the corners of the box around the used vertices of all bodies; the unit cube for no bodies."""
+    if not bodies:
+        return np.full(3, -0.5), np.full(3, 0.5)
+    corners: list[Array] = []
+    for b in bodies:
+        used = b.mesh.vertices[np.unique(b.mesh.faces)]
+        world = used @ b.pose[:3, :3].T + b.pose[:3, 3]
+        corners += [world.min(axis=0), world.max(axis=0)]
+    stacked = np.array(corners)
+    return stacked.min(axis=0), stacked.max(axis=0)
+
+
+def _check_extent(environment: Environment, extent: float, log: DiagnosticLog) -> None:
+    low, high = _PLAUSIBLE_EXTENT
+    if not low <= extent <= high:
+        log.info(
+            "GEO251", environment.name, f"the scene measures {extent:.3g} m across: is its unit a metre?",
+            hint="give the metres per file unit with scale= (--scale)",
+        )  # fmt: skip

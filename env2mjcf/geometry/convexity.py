@@ -1,0 +1,150 @@
+"""Is a closed surface the boundary of its own hull, and is that hull a box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .topology import Edges, Floats, Ints, edges
+
+_BLOCK = 4_000_000  # distances held in memory at once
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """A box in the mesh's frame.
+
+    Attributes:
+        half_sizes: (3,) half of each side.
+        center: (3,).
+        rotation: (3, 3) columns are the directions of the sides; the identity for a box along the axes.
+    """
+
+    half_sizes: Floats
+    center: Floats
+    rotation: Floats
+
+
+def is_convex(vertices: Floats, faces: Ints, tolerance: float, table: Edges | None = None) -> bool:
+    """Tell whether every vertex lies within `tolerance` behind the plane of every face.
+
+    The surface must be closed; its winding does not matter, because the mean of its vertices is inside a convex one.
+
+    Args:
+        vertices: (n, 3), all used by `faces`.
+        faces: (m, 3) without degenerate ones.
+        tolerance: Length.
+        table: Edges of `faces`, if they are at hand.
+    """
+    if len(faces) < 4:
+        return False
+    normals, offsets = _planes_from_mean(vertices, faces)
+    return _edges_bulge(vertices, faces, normals, offsets, tolerance, table or edges(faces)) and _all_behind(
+        vertices, *_distinct(normals, offsets), tolerance
+    )
+
+
+def _planes_from_mean(vertices: Floats, faces: Ints) -> tuple[Floats, Floats]:
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.einsum("ij,ij->i", normals, corners.mean(axis=1) - vertices.mean(axis=0))
+    normals[heights < 0] *= -1
+    # A vertex of the triangle farthest out: a face does not fail on the rounding of its own corners.
+    return normals, np.einsum("ij,ikj->ik", normals, corners).max(axis=1)
+
+
+def _edges_bulge(
+    vertices: Floats, faces: Ints, normals: Floats, offsets: Floats, tolerance: float, table: Edges
+) -> bool:
+    """Test each face against the neighbours only: linear in time, and most non-convex meshes end here."""
+    order = np.argsort(table.of_corner.ravel(), kind="stable")
+    edge, corner = table.of_corner.ravel()[order], order
+    linked = np.flatnonzero(edge[1:] == edge[:-1])
+    for here, there in ((corner[linked], corner[linked + 1]), (corner[linked + 1], corner[linked])):
+        face, opposite = here // 3, faces[there // 3, (there % 3 + 2) % 3]
+        if (np.einsum("ij,ij->i", normals[face], vertices[opposite]) > offsets[face] + tolerance).any():
+            return False
+    return True
+
+
+def _distinct(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+    """Drop planes that are equal to the last bit, as those of a tessellated flat side often are."""
+    planes = np.unique(np.column_stack([normals, offsets]), axis=0)
+    return planes[:, :3], planes[:, 3]
+
+
+def _all_behind(vertices: Floats, normals: Floats, offsets: Floats, tolerance: float) -> bool:
+    """Test every vertex against every plane, skipping clusters of vertices whose bounding box lies behind it."""
+    clusters = _clusters(vertices)  # (c, s, 3)
+    middle = (clusters.min(axis=1) + clusters.max(axis=1)) / 2
+    half = np.ptp(clusters, axis=1) / 2
+    step = max(1, _BLOCK // len(clusters))
+    for i in range(0, len(normals), step):
+        normal, limit = normals[i : i + step], offsets[i : i + step] + tolerance
+        plane, cluster = np.nonzero(normal @ middle.T + np.abs(normal) @ half.T > limit[:, None])
+        per_block = max(1, _BLOCK // clusters.shape[1])
+        for j in range(0, len(plane), per_block):
+            p, c = plane[j : j + per_block], cluster[j : j + per_block]
+            if ((clusters[c] @ normal[p][:, :, None])[:, :, 0].max(axis=1) > limit[p]).any():
+                return False
+    return True
+
+
+def _clusters(vertices: Floats, size: int = 64) -> Floats:
+    """Split points at medians into clusters of equal size, (c, s, 3); some points are repeated to fill them."""
+    count = 1 << max(0, int(np.ceil(np.log2(len(vertices) / size))))
+    each = -(-len(vertices) // count)
+    parts = np.resize(vertices, (each * count, 3))[None]
+    while len(parts) < count:
+        axis = np.ptp(parts, axis=1).argmax(axis=1)
+        order = np.argsort(np.take_along_axis(parts, axis[:, None, None], axis=2)[:, :, 0], axis=1)
+        parts = np.take_along_axis(parts, order[:, :, None], axis=1).reshape(2 * len(parts), -1, 3)
+    return parts
+
+
+def exact_box(vertices: Floats, faces: Ints, tolerance: float) -> Box | None:
+    """Return the box that a convex surface is, to within `tolerance`, or None.
+
+    Args:
+        vertices: (n, 3), all used by `faces`.
+        faces: (m, 3) of a convex surface.
+        tolerance: Length by which a corner may be off.
+    """
+    corners = vertices[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(areas, axis=1)
+    normals = areas / sizes[:, None]
+    first = normals[np.argmax(sizes)]
+    # Sides that stand on the first: the largest of them gives the second direction.
+    upright = np.abs(normals @ first) < 0.5
+    if not upright.any():
+        return None
+    second = normals[upright][np.argmax(sizes[upright])]
+    second = second - first * (first @ second)
+    second /= np.linalg.norm(second)
+    rotation = _nearest_to_identity(np.column_stack([first, second, np.cross(first, second)]))
+    local = vertices @ rotation
+    low, high = local.min(axis=0), local.max(axis=0)
+    on_side = np.minimum(np.abs(local - low), np.abs(local - high)) <= tolerance
+    # On a box each vertex lies on a side, and each corner is a vertex.
+    at_corner = np.unique((local > (low + high) / 2)[on_side.all(axis=1)], axis=0)
+    if not on_side.any(axis=1).all() or len(at_corner) != 8:
+        return None
+    return Box((high - low) / 2, rotation @ ((low + high) / 2), rotation)
+
+
+def _nearest_to_identity(axes: Floats) -> Floats:
+    """Reorder and turn round the columns so that the diagonal is large and positive and the frame right-handed."""
+    columns = [0, 1, 2]
+    chosen: list[int] = []
+    for row in range(3):
+        best = max(columns, key=lambda c: (round(abs(float(axes[row, c])), 9), -c))
+        columns.remove(best)
+        chosen.append(best)
+    out = axes[:, chosen]
+    out = out * np.where(np.diag(out) < 0, -1.0, 1.0)
+    if np.linalg.det(out) < 0:
+        out[:, 2] *= -1
+    return np.asarray(out + 0.0, dtype=np.float64)

@@ -1,0 +1,33 @@
+"""Convex hulls: how much more space than the mesh one takes.
+
+trimesh needs scipy for hulls, which env2mjcf does not depend on. Pieces need no hull of their own, because MuJoCo
+takes the hull of the points that it is given; so MuJoCo is also asked for the volume of what it will collide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .topology import Floats
+
+
+def hull_volume(points: Floats) -> float:
+    """Return the volume of the convex hull of points that are not coplanar, (n, 3).
+
+    Computed by MuJoCo's qhull from float32 vertices: good to about 1e-6 of the cube of the diagonal.
+
+    Raises:
+        ValueError: The points are (nearly) coplanar.
+    """
+    import mujoco  # only here: the rest of geometry/ works without MuJoCo
+
+    size = float(np.ptp(points, axis=0).max())
+    if size == 0:
+        raise ValueError("the points coincide, so they have no hull")
+    spec = mujoco.MjSpec()
+    local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
+    spec.add_mesh(name="hull", uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    body = spec.worldbody.add_body()
+    body.add_freejoint()
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", density=1.0)
+    return float(spec.compile().body_mass[1]) * size**3

@@ -1,0 +1,69 @@
+"""Which side of a closed surface is outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .topology import Bools, Floats, Ints
+
+_BLOCK = 2_000_000  # solid angles held in memory at once
+
+
+def face_volumes(vertices: Floats, faces: Ints) -> Floats:
+    """Return six times the signed volume of the tetrahedron from the vertices' mean to each face, (m,)."""
+    corners = vertices[faces] - vertices.mean(axis=0)
+    return np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+
+
+def winding_numbers(points: Floats, vertices: Floats, faces: Ints) -> Floats:
+    """Return how often the surface winds around each point, (k,): 0 outside, 1 inside, in between if it is open.
+
+    Sums signed solid angles (van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed.
+    Eng. 30(2), 1983).
+    """
+    out = np.empty(len(points))
+    step = max(1, _BLOCK // max(1, len(faces)))
+    for i in range(0, len(points), step):
+        a, b, c = (vertices[faces[:, k]] - points[i : i + step, None] for k in range(3))
+        la, lb, lc = (np.linalg.norm(x, axis=2) for x in (a, b, c))
+        top = np.einsum("kmi,kmi->km", a, np.cross(b, c))
+        bottom = la * lb * lc
+        for x, y, lz in ((a, b, lc), (b, c, la), (c, a, lb)):
+            bottom += np.einsum("kmi,kmi->km", x, y) * lz
+        out[i : i + step] = np.arctan2(top, bottom).sum(axis=1) / (2 * np.pi)
+    return out
+
+
+def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats) -> Bools:
+    """Tell which components of a closed, consistently wound surface are wound inside out, (c,).
+
+    A component of negative volume that lies in no other one is inside out, and everything in it was wound by the same
+    hand; a negative one within another is a cavity.
+
+    Args:
+        vertices: (n, 3).
+        faces: (m, 3).
+        component: (m,) component of each face.
+        volumes: (c,) signed volume of each component.
+    """
+    flipped = np.zeros(len(volumes), dtype=np.bool_)
+    if not (volumes < 0).any() or len(volumes) == 1:
+        return volumes < 0
+    order = np.argsort(component, kind="stable")
+    groups = np.split(faces[order], np.cumsum(np.bincount(component))[:-1])
+    low = np.array([vertices[g.ravel()].min(axis=0) for g in groups])
+    high = np.array([vertices[g.ravel()].max(axis=0) for g in groups])
+    # The middle of a face stays clear of edges that components may share.
+    probes = np.array([vertices[g[0]].mean(axis=0) for g in groups])
+    for i in np.flatnonzero(volumes < 0):
+        around = np.flatnonzero((low <= low[i]).all(axis=1) & (high >= high[i]).all(axis=1))
+        if any(_holds(vertices, groups[j], probes[i : i + 1])[0] for j in around if j != i):
+            continue
+        within = np.flatnonzero((low >= low[i]).all(axis=1) & (high <= high[i]).all(axis=1))
+        flipped[within[_holds(vertices, groups[i], probes[within])]] = True
+        flipped[i] = True
+    return flipped
+
+
+def _holds(vertices: Floats, faces: Ints, points: Floats) -> Bools:
+    return np.abs(winding_numbers(points, vertices, faces)) > 0.5

@@ -1,0 +1,151 @@
+"""Convex pieces: point sets that MuJoCo takes the hull of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .polygons import Polygon
+from .topology import RELATIVE_TOLERANCE, Floats
+
+SLENDEREST = 5e-6
+"""Least width of a piece in units of its length: MuJoCo keeps mesh vertices as float32 (6e-8), and its qhull refuses
+points that are nearly coplanar."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConvexPiece:
+    """The convex hull of a few points.
+
+    Attributes:
+        vertices: (k, 3) float64, read-only, relative to `center`, so that rounding to float32 is relative to the
+            size of the piece and not to its place.
+        center: (3,) float64, read-only, in the mesh's frame.
+        polygon: The polygon of the surface that it stands for, over the analysis's vertices; None for a hull.
+    """
+
+    vertices: Floats
+    center: Floats
+    polygon: Polygon | None = None
+
+
+def hull_piece(points: Floats, thickness: float) -> ConvexPiece:
+    """Make one piece of all points, (n, 3).
+
+    A plate or a rod that is too thin for MuJoCo grows evenly to both sides, by `thickness` / 2 at most; a flat one
+    becomes `thickness` thick.
+    """
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    local = points - center
+    axes = np.linalg.svd(np.vstack([local - local.mean(axis=0), np.zeros((3, 3))]), full_matrices=False)[2]
+    spread = np.ptp(local @ axes.T, axis=0)
+    for axis, width in zip(axes, spread, strict=True):
+        least = min(thickness, SLENDEREST * float(spread.max()))
+        if width < least:
+            reach = (thickness if width < least / 1000 else least) - width
+            local = np.concatenate([local + axis * (reach / 2), local - axis * (reach / 2)])
+    return _frozen(local, center)
+
+
+def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inward: bool) -> tuple[ConvexPiece, ...]:
+    """Make one thin prism of each polygon.
+
+    Args:
+        vertices: (n, 3) what the polygons' loops refer to.
+        polygons: Convex polygons.
+        thickness: Height of the prisms.
+        inward: Extrude against the normal, so that the outer face is exactly the polygon; else half to each side.
+
+    Returns:
+        Prisms in the order of the polygons. One of a polygon too narrow for MuJoCo is widened, by less than
+        `thickness`.
+    """
+    loops = [_corners(vertices, polygon.loop) for polygon in polygons]
+    by_length: dict[int, list[int]] = {}
+    for i, loop in enumerate(loops):
+        by_length.setdefault(len(loop), []).append(i)
+    out: list[ConvexPiece | None] = [None] * len(polygons)
+    below, above = (-thickness, 0.0) if inward else (-thickness / 2, thickness / 2)
+    for members in by_length.values():
+        corners = vertices[np.array([loops[i] for i in members])]  # (g, k, 3)
+        normals = np.array([polygons[i].normal for i in members])
+        centers = corners.mean(axis=1)
+        local = corners - centers[:, None]
+        shift = normals[:, None] * np.array([below, above])[None, :, None]  # (g, 2, 3)
+        points = (local[:, None] + shift[:, :, None]).reshape(len(members), -1, 3)
+        points.setflags(write=False)
+        centers.setflags(write=False)
+        narrow = _too_narrow(local, normals, thickness)
+        for row, i in enumerate(members):
+            if narrow[row]:
+                rectangle = _widened(local[row], normals[row], thickness)
+                whole = np.concatenate([rectangle + shift[row, 0], rectangle + shift[row, 1]])
+                out[i] = _frozen(whole, centers[row], polygons[i])
+            else:
+                out[i] = ConvexPiece(points[row], centers[row], polygons[i])
+    return tuple(piece for piece in out if piece is not None)
+
+
+def _corners(vertices: Floats, loop: tuple[int, ...]) -> tuple[int, ...]:
+    """Leave out the vertices of a convex loop at which it goes straight on: its hull does not need them."""
+    if len(loop) == 3:
+        return loop
+    points = vertices[list(loop)]
+    tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turn = np.linalg.norm(np.cross(before, after), axis=1)
+    bends = turn > tolerance * np.linalg.norm(before + after, axis=1)
+    if bends.all():
+        return loop
+    # Many small turns in a row are a curve: what is left out is measured from the last vertex that stays.
+    start = int(np.argmax(turn))
+    kept = [start]
+    for i in range(start + 1, start + len(loop)):
+        u, v = points[i % len(loop)] - points[kept[-1]], after[i % len(loop)]
+        if np.linalg.norm(np.cross(u, v)) > tolerance * np.linalg.norm(u + v):
+            kept.append(i % len(loop))
+    return tuple(loop[i] for i in kept)
+
+
+def _least_width(length: Floats, thickness: float) -> Floats:
+    return np.minimum(thickness, SLENDEREST * np.maximum(length, thickness))
+
+
+def _across(local: Floats, normals: Floats) -> Floats:
+    """Return (g, k, k): how far each corner lies inside of each edge's line."""
+    along = np.roll(local, -1, axis=1) - local
+    inside = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
+    return np.einsum("gej,gvj->gev", inside, local) - np.einsum("gej,gej->ge", inside, local)[:, :, None]
+
+
+def _too_narrow(local: Floats, normals: Floats, thickness: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    # A convex polygon is narrowest square to one of its edges.
+    out = np.empty(len(local), dtype=np.bool_)
+    step = max(1, 2_000_000 // local.shape[1] ** 2)
+    for i in range(0, len(local), step):
+        part = local[i : i + step]
+        width = _across(part, normals[i : i + step]).max(axis=2).min(axis=1)
+        out[i : i + step] = width < _least_width(np.ptp(part, axis=1).max(axis=1), thickness)
+    return out
+
+
+def _widened(local: Floats, normal: Floats, thickness: float) -> Floats:
+    """Return the corners (4, 3) of a rectangle about a narrow polygon that is wide enough in both directions."""
+    across = _across(local[None], normal[None])[0]
+    edge = int(np.argmin(across.max(axis=1)))
+    along = np.roll(local, -1, axis=0)[edge] - local[edge]
+    along /= np.linalg.norm(along)
+    axes = np.stack([along, np.cross(normal, along)])
+    flat = local @ axes.T
+    middle, half = (flat.min(axis=0) + flat.max(axis=0)) / 2, np.ptp(flat, axis=0) / 2
+    half = np.maximum(half, _least_width(np.full(2, 2 * half.max()), thickness) / 2)
+    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return (middle + signs * half) @ axes
+
+
+def _frozen(vertices: Floats, center: Floats, polygon: Polygon | None = None) -> ConvexPiece:
+    vertices.setflags(write=False)
+    center.setflags(write=False)
+    return ConvexPiece(vertices, center, polygon)

@@ -1,0 +1,164 @@
+"""Merge adjacent coplanar triangles into convex polygons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .topology import Floats, Ints, edges
+
+_PARALLEL = 1.0 - 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polygon:
+    """A convex planar polygon over a vertex list.
+
+    Attributes:
+        loop: Vertex indices, counter-clockwise from outside; three in a row may be collinear.
+        normal: (3,) unit normal.
+        faces: Indices of the triangles that it covers.
+    """
+
+    loop: tuple[int, ...]
+    normal: Floats
+    faces: tuple[int, ...]
+
+
+def convex_polygons(vertices: Floats, faces: Ints, tolerance: float) -> tuple[Polygon, ...]:
+    """Cover the surface with convex polygons made of whole triangles.
+
+    Removes the longest edges between coplanar triangles first, as long as the result stays convex (Hertel and
+    Mehlhorn, "Fast triangulation of simple polygons", FCT 1983; within four times the least number of pieces).
+
+    Args:
+        vertices: (n, 3).
+        faces: (m, 3) without degenerate ones.
+        tolerance: Length by which a merged vertex may be off the plane, or a corner reflex.
+
+    Returns:
+        Polygons in the order of their first triangles.
+    """
+    if len(faces) == 0:
+        return ()
+    corners = vertices[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    merger = _Merger(vertices, faces, areas, tolerance)
+    for left, right, a, b in _candidates(vertices, faces, areas, tolerance):
+        merger.merge(left, right, a, b)
+    return merger.polygons()
+
+
+def _candidates(vertices: Floats, faces: Ints, areas: Floats, tolerance: float) -> list[tuple[int, int, int, int]]:
+    """Return (left face, right face, a, b) of edges a-b between coplanar faces, the longest first."""
+    table = edges(faces)
+    order = np.argsort(table.of_corner.ravel(), kind="stable")
+    edge = table.of_corner.ravel()[order]
+    twice = np.flatnonzero((edge[1:] == edge[:-1]) & ((table.faces == 2) & (table.balance == 0))[edge[:-1]])
+    here, there = order[twice], order[twice + 1]
+    left, right = here // 3, there // 3
+    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    parallel = np.einsum("ij,ij->i", normals[left], normals[right]) > _PARALLEL
+    apart = vertices[faces[right, (there + 2) % 3]] - vertices[faces[left, here % 3]]
+    level = np.abs(np.einsum("ij,ij->i", normals[left], apart)) <= tolerance
+    chosen = np.flatnonzero(parallel & level)
+    a, b = faces[left, here % 3], faces[left, (here + 1) % 3]
+    length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    chosen = chosen[np.lexsort((edge[twice][chosen], -length[chosen]))]
+    return np.column_stack([left, right, a, b])[chosen].tolist()
+
+
+class _Merger:
+    """The polygons so far; each is known by one of its triangles (union-find)."""
+
+    def __init__(self, vertices: Floats, faces: Ints, areas: Floats, tolerance: float) -> None:
+        self._points: list[list[float]] = vertices.tolist()
+        self._areas: list[list[float]] = areas.tolist()
+        self._loops: list[list[int]] = faces.tolist()
+        self._parent = list(range(len(faces)))
+        self._tolerance = tolerance
+
+    def merge(self, left: int, right: int, a: int, b: int) -> None:
+        """Remove the edge a-b between the polygons of two triangles, if one convex polygon is left."""
+        left, right = self._find(left), self._find(right)
+        if left == right:
+            return
+        joined = _joined(self._loops[left], self._loops[right], a, b)
+        if joined is None:
+            return
+        loop, seam = joined
+        big, small = sorted((left, right), key=lambda f: -_dot(self._areas[f], self._areas[f]))
+        normal = self._areas[big]
+        size = _dot(normal, normal) ** 0.5
+        normal = [x / size for x in normal]
+        # Neighbours are coplanar in pairs; many pairs in a row may still bend away from a plane.
+        origin = self._points[self._loops[big][0]]
+        if any(abs(_dot(normal, _minus(self._points[v], origin))) > self._tolerance for v in self._loops[small]):
+            return
+        if not (self._is_corner(loop, 0, normal) and self._is_corner(loop, seam, normal)):
+            return
+        first, second = min(left, right), max(left, right)
+        self._parent[second] = first
+        self._loops[first] = loop
+        self._areas[first] = [x + y for x, y in zip(self._areas[left], self._areas[right], strict=True)]
+
+    def polygons(self) -> tuple[Polygon, ...]:
+        members: dict[int, list[int]] = {}
+        for face in range(len(self._parent)):
+            members.setdefault(self._find(face), []).append(face)
+        areas = np.array([self._areas[root] for root in members])
+        normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+        normals.setflags(write=False)
+        return tuple(
+            Polygon(tuple(self._loops[root]), normal, tuple(faces))
+            for (root, faces), normal in zip(members.items(), normals, strict=True)
+        )
+
+    def _find(self, face: int) -> int:
+        parent = self._parent
+        while parent[face] != face:
+            parent[face] = parent[parent[face]]
+            face = parent[face]
+        return face
+
+    def _is_corner(self, loop: list[int], i: int, normal: list[float]) -> bool:
+        """Tell whether the loop turns left, or goes straight on, at its i-th vertex."""
+        before, at, after = (self._points[loop[k % len(loop)]] for k in (i - 1, i, i + 1))
+        u, v = _minus(at, before), _minus(after, at)
+        turn = _dot(normal, _cross(u, v))
+        chord = _dot(_minus(after, before), _minus(after, before)) ** 0.5
+        if turn > self._tolerance * chord:
+            return True
+        # The height of the corner over the chord says how far a reflex one is from straight.
+        return turn >= -self._tolerance * chord and _dot(u, v) > 0
+
+
+def _joined(left: list[int], right: list[int], a: int, b: int) -> tuple[list[int], int] | None:
+    """Return the outline of two loops that share a-b (walked a to b by the left one), or None if it is not simple.
+
+    The loops meet at its first vertex and at the vertex whose position is returned with it.
+    """
+    i, j = left.index(b), right.index(a)
+    left, right = left[i:] + left[:i], right[j:] + right[:j]  # b ... a and a ... b
+    if left[-1] != a or right[-1] != b:
+        return None
+    # A shared chain of collinear edges goes as a whole.
+    while len(left) > 2 and len(right) > 2 and left[-2] == right[1]:
+        left, right = left[:-1], right[1:]
+    while len(left) > 2 and len(right) > 2 and left[1] == right[-2]:
+        left, right = left[1:], right[:-1]
+    loop = left + right[1:-1]
+    return (loop, len(left) - 1) if len(loop) >= 3 and len(set(loop)) == len(loop) else None
+
+
+def _dot(u: list[float], v: list[float]) -> float:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+def _minus(u: list[float], v: list[float]) -> list[float]:
+    return [u[0] - v[0], u[1] - v[1], u[2] - v[2]]
+
+
+def _cross(u: list[float], v: list[float]) -> list[float]:
+    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]

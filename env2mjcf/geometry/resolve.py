@@ -1,0 +1,152 @@
+"""Finds the mesh files that a scene names."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from ..errors import DiagnosticLog, GeometryError, Span, did_you_mean
+from ..model import Environment
+from ..options import Options
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    code: str
+    name: str
+    message: str
+    hint: str
+    span: Span | None
+
+
+def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) -> dict[str, Path]:
+    """Find every mesh file of a scene.
+
+    A name is looked for beside the environment file, then in each of `mesh_dirs`, then in the same places with
+    backslashes read as slashes, then without regard to case. What is found must lie, symbolic links resolved,
+    inside one of these folders, unless `allow_outside`.
+
+    Returns:
+        Path of each file name, in the order of the bodies.
+
+    Raises:
+        GeometryError: One or more files are missing, forbidden or unreadable; one error names them all.
+    """
+    finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
+    found: dict[str, Path] = {}
+    problems: dict[str, _Problem] = {}
+    for multibody in environment.multibodies:
+        for body in multibody.bodies:
+            name = body.filename
+            if name in found or name in problems:
+                continue
+            result = finder.find(name, body.span)
+            if isinstance(result, _Problem):
+                problems[name] = result
+            else:
+                found[name] = result
+    if problems:
+        first, *others = problems.values()
+        message, hint = first.message, first.hint
+        if others:
+            lines = (
+                f"  {p.span or environment.path}: {p.message}" + (f" ({p.hint})" if p.hint else "")
+                for p in (first, *others)
+            )
+            message, hint = f"{len(problems)} mesh files cannot be used:\n" + "\n".join(lines), ""
+        log.fail(GeometryError, first.code, first.name, message, hint=hint, span=first.span)
+    return found
+
+
+class _Finder:
+    """Looks for files in a list of folders."""
+
+    def __init__(self, folders: list[Path], allow_outside: bool, log: DiagnosticLog) -> None:
+        self._folders = folders
+        self._real_folders = [os.path.realpath(f) for f in folders]
+        self._allow_outside = allow_outside
+        self._log = log
+
+    def find(self, name: str, span: Span | None) -> Path | _Problem:
+        """Return where a file is, or why it cannot be used."""
+        if "\0" in name:
+            return _Problem("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
+        slashed = name.replace("\\", "/")
+        found = self._first_file(name)
+        if found is None and slashed != name:
+            found = self._first_file(slashed)
+            if found is not None:
+                message = f"the backslashes of {name!r} are read as slashes"
+                self._log.warn(GeometryError, "GEO206", name, message, hint=f"write {slashed}", span=span)
+        if found is None:
+            found = self._any_case(slashed)
+            if found is not None:
+                message = f"there is no {name!r}; {str(found)!r}, which differs in case, is read"
+                self._log.warn(GeometryError, "GEO205", name, message, hint="write the name as the file's", span=span)
+        if found is None:
+            return self._missing(name, span)
+        if not self._inside(found):
+            return self._outside(found, span)
+        if not os.access(found, os.R_OK):
+            return _Problem("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span)
+        return found
+
+    def _candidates(self, name: str) -> list[Path]:
+        # Joining an absolute name to a folder gives the name itself.
+        return list(dict.fromkeys(folder / name for folder in self._folders))
+
+    def _first_file(self, name: str) -> Path | None:
+        """Return the first candidate that is a file, those inside the allowed folders before all others."""
+        files = [c for c in self._candidates(name) if os.path.isfile(c)]
+        return next((f for f in files if self._inside(f)), files[0] if files else None)
+
+    def _any_case(self, name: str) -> Path | None:
+        matches = (_match_case(folder, name) for folder in self._folders if not PurePosixPath(name).is_absolute())
+        return next((m for m in matches if m is not None and self._inside(m)), None)
+
+    def _inside(self, path: Path) -> bool:
+        if self._allow_outside:
+            return True
+        real = os.path.realpath(path)
+        return any(real == f or real.startswith(os.path.join(f, "")) for f in self._real_folders)
+
+    def _outside(self, found: Path, span: Span | None) -> _Problem:
+        return _Problem(
+            "GEO202",
+            str(found),
+            f"{str(found)!r} lies outside the scene's folder and mesh_dirs",
+            f"if you trust the scene: allow_outside=True (--allow-outside), or mesh_dirs=[{str(found.parent)!r}]",
+            span,
+        )
+
+    def _missing(self, name: str, span: Span | None) -> _Problem:
+        slashed = name.replace("\\", "/")
+        candidates = self._candidates(slashed)
+        for candidate in candidates:
+            if os.path.lexists(candidate) and self._inside(candidate):
+                kind = "folder" if candidate.is_dir() else "broken link or a special file"
+                return _Problem("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
+        places = ", ".join(repr(str(c)) for c in candidates)
+        # Folders outside are not listed: an error message must not show what they hold.
+        near = [x for c in candidates if self._inside(c.parent) for x in _listing(c.parent)]
+        hint = (
+            did_you_mean(PurePosixPath(slashed).name, near) or "add the folder that holds it to mesh_dirs (--mesh-dirs)"
+        )
+        return _Problem("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
+
+
+def _match_case(folder: Path, name: str) -> Path | None:
+    """Return the file that a name means when case is ignored; the first in code point order where several fit."""
+    at = folder
+    for part in PurePosixPath(name).parts:
+        exact = part == ".." or os.path.lexists(at / part)
+        at /= part if exact else next((x for x in _listing(at) if x.lower() == part.lower()), part)
+    return at if os.path.isfile(at) else None
+
+
+def _listing(folder: Path) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except OSError:
+        return []

@@ -1,0 +1,174 @@
+"""Mesh in, convex collision pieces out: the seam between geometry and MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import DiagnosticLog, Span
+from ..options import Collision
+from .analysis import Analysis, refuse_without_area
+from .convexity import is_convex
+from .hull import hull_volume
+from .mesh import Mesh
+from .pieces import ConvexPiece, hull_piece, prisms
+from .polygons import convex_polygons
+from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints
+
+__all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CollisionShape:
+    """What stands for a mesh in collision.
+
+    Attributes:
+        mesh: The mesh.
+        strategy: What was applied: "hull", or "surface" if any part is collided as a surface.
+        pieces: Convex pieces whose union collides.
+        needs_containment: Some closed part is represented by its surface only, and its inside counts as collision:
+            the caller must test that separately.
+        analysis: The mesh's analysis.
+        note: One sentence for the report.
+    """
+
+    mesh: Mesh
+    strategy: str
+    pieces: tuple[ConvexPiece, ...]
+    needs_containment: bool
+    analysis: Analysis
+    note: str
+
+
+def collision_shape(
+    mesh: Mesh,
+    analysis: Analysis,
+    strategy: Collision,
+    thickness: float,
+    log: DiagnosticLog,
+    subject: str = "",
+    span: Span | None = None,
+) -> CollisionShape:
+    """Choose the convex pieces that stand for a mesh in collision.
+
+    Args:
+        mesh: The mesh.
+        analysis: `analyse(mesh)`.
+        strategy: One of the `collision` option's values.
+        thickness: Height of the prisms that stand for surfaces; no piece leaves the surface by more.
+        log: Takes a finding where the pieces are not faithful.
+        subject: What the findings are about; the mesh's name if empty.
+        span: Where the mesh is named in the source.
+
+    Raises:
+        GeometryError: The mesh is a point or a line (GEO231).
+        NotImplementedError: The strategy is "solid" or "coacd".
+        ValueError: The thickness is not positive, or the strategy is unknown.
+    """
+    if not 0 < thickness < np.inf:
+        raise ValueError(f"thickness must be a positive length, got {thickness!r}")
+    if strategy in _LATER:
+        raise NotImplementedError(f"collision={strategy!r} is not available yet; {_LATER[strategy]}")
+    if strategy not in _STRATEGIES:
+        raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, (*_STRATEGIES, *_LATER)))}")
+    if analysis.dimension < 2:
+        refuse_without_area(analysis, log, subject or mesh.name, span)
+    shape = _STRATEGIES[strategy](mesh, analysis, thickness)
+    if strategy == "hull" and not analysis.convex:
+        hint = "collision='auto' collides the true shape"
+        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
+    return shape
+
+
+def _hull(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+    piece = hull_piece(analysis.vertices, thickness)
+    return CollisionShape(mesh, "hull", (piece,), False, analysis, _hull_note(analysis, piece))
+
+
+def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
+    if analysis.convex:
+        return "convex: one hull"
+    if analysis.flat:
+        return "flat: one thin plate, the convex hull of its outline"
+    claimed = hull_volume(piece.vertices)
+    if not analysis.solid or analysis.volume <= 0:
+        return f"one hull of volume {claimed:.6g} about a surface that encloses nothing for certain"
+    # Overlapping components count twice in the mesh's volume, so the hull may seem to claim less.
+    extra = max(0.0, claimed / analysis.volume - 1)
+    return f"one hull of a non-convex mesh: claims {extra:.3g} times its volume more than it has"
+
+
+def _surface(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+    pieces, note = _prisms(analysis, analysis.faces, thickness)
+    return CollisionShape(mesh, "surface", pieces, False, analysis, note)
+
+
+def _prisms(analysis: Analysis, faces: Ints, thickness: float) -> tuple[tuple[ConvexPiece, ...], str]:
+    polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
+    pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
+    return pieces, f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
+
+
+def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+    if analysis.convex:
+        return _hull(mesh, analysis, thickness)
+    if not analysis.closed:
+        return _surface(mesh, analysis, thickness)
+    whole = _convex_solids(analysis)
+    hulls = tuple(
+        hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
+        for c in np.flatnonzero(whole)
+    )
+    rest = analysis.faces[~whole[analysis.component]]
+    hulled = f"{_count(len(hulls), 'convex part')} as hulls"
+    if len(rest) == 0:
+        return CollisionShape(mesh, "hull", hulls, False, analysis, hulled)
+    pieces, note = _prisms(analysis, rest, thickness)
+    return CollisionShape(
+        mesh, "surface", hulls + pieces, True, analysis, f"{hulled}, {note}" if hulls else note
+    )
+
+
+def _convex_solids(analysis: Analysis) -> Bools:
+    """Tell which components are convex solids without a cavity in them, (c,).
+
+    A solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
+    """
+    out = np.zeros(analysis.components, dtype=np.bool_)
+    if not analysis.solid:
+        return out
+    order = np.argsort(analysis.component, kind="stable")
+    groups = np.split(analysis.faces[order], np.cumsum(np.bincount(analysis.component))[:-1])
+    parts = [np.unique(g, return_inverse=True) for g in groups]
+    points = [analysis.vertices[used] for used, _ in parts]
+    low, high = (np.array([f(p, axis=0) for p in points]) for f in (np.min, np.max))
+    size = np.linalg.norm(high - low, axis=1)
+    volumes = analysis.component_volumes
+    cavities = volumes <= RELATIVE_TOLERANCE * size**3
+    for c in np.flatnonzero(~cavities):
+        if not _apart(low[c], high[c], low[cavities], high[cavities]):
+            continue
+        out[c] = is_convex(points[c], parts[c][1].reshape(-1, 3).astype(np.int64), RELATIVE_TOLERANCE * size[c])
+    return out
+
+
+def _apart(low: Floats, high: Floats, lows: Floats, highs: Floats) -> bool:
+    """Tell whether a bounding box meets none of the others."""
+    return bool(((lows > high) | (highs < low)).any(axis=1).all())
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
+_STRATEGIES: dict[str, Callable[[Mesh, Analysis, float], CollisionShape]] = {
+    "auto": _auto,
+    "hull": _hull,
+    "surface": _surface,
+}
+_LATER = {
+    "solid": "use collision='auto', which tests the inside of closed meshes separately",
+    "coacd": "use collision='auto' for exact contact, or collision='hull' for speed",
+}

@@ -1,0 +1,113 @@
+"""Which vertices are one point, which faces share an edge, which faces hang together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+RELATIVE_TOLERANCE = 1e-9
+"""What counts as nothing, in units of a mesh's diagonal: far below float32, far above the rounding of coordinates."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """The undirected edges of a triangle list.
+
+    Attributes:
+        ends: (e, 2) vertex indices, the smaller one first.
+        of_corner: (m, 3) edge that leads from each corner of a face to the next one.
+        forward: (m, 3) whether that corner walks its edge from `ends[0]` to `ends[1]`.
+        faces: (e,) number of faces at each edge.
+        balance: (e,) how many more faces walk it forward than backward; 0 where the winding agrees.
+    """
+
+    ends: Ints
+    of_corner: Ints
+    forward: Bools
+    faces: Ints
+    balance: Ints
+
+
+def edges(faces: Ints) -> Edges:
+    """Tabulate the edges of `faces`, (m, 3) vertex indices."""
+    start, end = faces, np.roll(faces, -1, axis=1)
+    forward = start < end
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    span = int(high.max()) + 1 if len(faces) else 1
+    keys, of_corner = np.unique(low * span + high, return_inverse=True)
+    of_corner = of_corner.reshape(-1, 3).astype(np.int64)
+    count = np.bincount(of_corner.ravel(), minlength=len(keys)).astype(np.int64)
+    ahead = np.bincount(of_corner[forward], minlength=len(keys)).astype(np.int64)
+    return Edges(np.stack(np.divmod(keys, span), axis=1), of_corner, forward, count, 2 * ahead - count)
+
+
+def face_components(table: Edges) -> Ints:
+    """Label faces that are linked by shared edges, (m,) from 0 in order of each component's first face."""
+    count = len(table.of_corner)
+    order = np.argsort(table.of_corner.ravel(), kind="stable")
+    edge, face = table.of_corner.ravel()[order], order // 3
+    linked = edge[1:] == edge[:-1]
+    return connected(count, face[:-1][linked], face[1:][linked])
+
+
+def connected(count: int, a: Ints, b: Ints) -> Ints:
+    """Label the connected components of the graph with `count` nodes and links `a[i]`-`b[i]`.
+
+    Returns:
+        (count,) labels from 0, in order of each component's first node.
+    """
+    labels = np.arange(count, dtype=np.int64)
+    while len(a):
+        # Hook the larger root of every link onto the smaller one, then let all nodes point at their roots.
+        root_a, root_b = labels[a], labels[b]
+        apart = root_a != root_b
+        if not apart.any():
+            break
+        a, b, root_a, root_b = a[apart], b[apart], root_a[apart], root_b[apart]
+        np.minimum.at(labels, np.maximum(root_a, root_b), np.minimum(root_a, root_b))
+        while not np.array_equal(jumped := labels[labels], labels):
+            labels = jumped
+    return np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+def weld(points: Floats, tolerance: float) -> Ints:
+    """Return for each point the lowest index of a point that it coincides with, (n,).
+
+    Points within `tolerance` on every axis coincide, and so do chains of such points.
+    """
+    count = len(points)
+    if count == 0:
+        return np.zeros(0, dtype=np.int64)
+    exact, label = np.unique(points + 0.0, axis=0, return_inverse=True)
+    label = label.reshape(-1)
+    if tolerance > 0:
+        label = _near(exact, tolerance)[label]
+    lowest = np.full(int(label.max()) + 1, count, dtype=np.int64)
+    np.minimum.at(lowest, label, np.arange(count))
+    return lowest[label]
+
+
+def _near(points: Floats, tolerance: float) -> Ints:
+    """Label clusters of near points.
+
+    A gap below the tolerance holds at most one multiple of it, so of two grids with cells of twice the tolerance,
+    one shifted by half a cell, at least one keeps the two points together on that axis; hence eight grids in space.
+    """
+    scaled = (points - points.min(axis=0)) / tolerance
+    links: list[tuple[Ints, Ints]] = []
+    for shift in product((0.0, 1.0), repeat=3):
+        cell = np.floor((scaled + shift) / 2).astype(np.int64)
+        order = np.lexsort(cell.T)
+        same = (cell[order[1:]] == cell[order[:-1]]).all(axis=1)
+        if same.any():
+            links.append((order[:-1][same], order[1:][same]))
+    if not links:
+        return np.arange(len(points), dtype=np.int64)
+    return connected(len(points), np.concatenate([x[0] for x in links]), np.concatenate([x[1] for x in links]))

@@ -1,0 +1,174 @@
+"""All that surrounds the bodies: options, defaults, light, camera, ground and boundary."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from ..geometry.assembly import Assembly
+from ..model import Boundary
+from ..options import Options
+from ..transforms import Array
+from .writer import Element, add, comment, number, numbers
+
+_STANDARD_GRAVITY = 9.80665
+_WIRE_COLOR = "0.35 0.38 0.42 0.6"
+
+
+def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
+    """Return a time step in seconds that fits the smallest link, to one digit.
+
+    A seventieth of the time in which that link falls by its own size, between 0.1 and 2 ms.
+    """
+    sizes = [p.mesh.diagonal for r in assembly.robots for p in r.links]
+    g = math.hypot(*gravity) or _STANDARD_GRAVITY
+    step = math.sqrt(2 * min(sizes, default=1.0) / g) / 70
+    return min(max(float(f"{step:.0e}"), 1e-4), 2e-3)
+
+
+def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
+    """Append compiler settings, options, statistics, visual settings and defaults."""
+    add(root, "compiler", angle="radian", autolimits="true", meshdir="assets")
+    step = time_step(assembly, options.gravity)
+    contact = float(f"{2.5 * step:.3g}")
+    comment(
+        root,
+        [
+            f"timestep: a seventieth of the time in which the smallest link falls by its own size, at most 2 ms.",
+            f"solref: contacts settle within {number(contact)} s, 2.5 steps: with MuJoCo's default of 0.02 s a fast body",
+            "sinks deeper than thin walls are thick. filterparent is off: the excludes below are the whole filter.",
+        ],
+    )
+    option = add(root, "option", timestep=number(step), gravity=numbers(options.gravity), integrator="implicitfast")
+    add(option, "flag", filterparent="disable")
+    center = (assembly.lower + assembly.upper) / 2
+    add(root, "statistic", center=numbers(center), extent=number(assembly.extent))
+    visual = add(root, "visual")
+    add(visual, "global", offwidth="1280", offheight="960")
+    add(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.4 0.4 0.4", specular="0 0 0")
+    add(visual, "map", znear="0.001", zfar="20")
+    default = add(root, "default")
+    # Thin cells have no volume to speak of; all masses are explicit.
+    add(default, "mesh", inertia="shell")
+    add(default, "geom", solref=f"{number(contact)} 1")
+    drawn = add(default, "default", class_="visual")
+    add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
+    collision = add(default, "default", class_="collision")
+    add(collision, "geom", type="mesh", group="3", contype="1", conaffinity="3", mass="0", rgba="0.9 0.5 0.2 0.4")
+
+
+def add_ground_material(asset: Element) -> None:
+    """Append the checkered material of the ground."""
+    add(
+        asset, "texture", name="ground", type="2d", builtin="checker", rgb1="0.86 0.87 0.88", rgb2="0.78 0.80 0.82",
+        width="256", height="256",
+    )  # fmt: skip
+    add(asset, "material", name="ground", texture="ground", texrepeat="8 8", reflectance="0.05")
+
+
+def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
+    """Append light, camera, and on request ground and boundary."""
+    center, extent = (assembly.lower + assembly.upper) / 2, assembly.extent
+    add(
+        world, "light", name="sun", type="directional", pos=numbers(center + (0, 0, extent)), dir="-0.3 0.4 -1",
+        diffuse="0.5 0.5 0.5", specular="0.1 0.1 0.1",
+    )  # fmt: skip
+    add(world, "camera", name="overview", **_camera(center, extent))
+    if options.ground:
+        # Slightly below the lowest point, so that nothing starts in contact with it.
+        height = assembly.lower[2] - 1e-3 * extent
+        add(
+            world, "geom", name="ground", type="plane", material="ground",
+            pos=numbers((center[0], center[1], height)), size=numbers((extent, extent, extent / 20)),
+        )  # fmt: skip
+    boundary = assembly.environment.boundary
+    if boundary is not None and options.boundary == "visual":
+        _add_wires(world, boundary, assembly)
+    elif boundary is not None and options.boundary == "solid":
+        _add_walls(world, boundary, assembly)
+
+
+def _camera(center: Array, extent: float) -> dict[str, str]:
+    """Look at the whole scene from the front right and above."""
+    back = np.array([0.55, -1.0, 0.75])
+    back /= np.linalg.norm(back)
+    right = np.cross((0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    half_angle = math.radians(45 / 2)
+    distance = 0.5 * extent / math.sin(half_angle) * 1.05
+    axes = np.concatenate([right, np.cross(back, right)])
+    return {"pos": numbers(center + distance * back), "xyaxes": numbers(axes), "fovy": "45"}
+
+
+def _corners(boundary: Boundary, assembly: Assembly) -> tuple[Array, Array]:
+    """Return the corners of a box; an unbounded axis is drawn as far as the bodies reach."""
+    lower, upper = assembly.lower.copy(), assembly.upper.copy()
+    lower[: len(boundary.lower)] = boundary.lower
+    upper[: len(boundary.upper)] = boundary.upper
+    return lower, upper
+
+
+def _add_wires(world: Element, boundary: Boundary, assembly: Assembly) -> None:
+    if boundary.lower:
+        lower, upper = _corners(boundary, assembly)
+        box = np.array([lower, upper])
+        corners = [box[list(c), range(3)] for c in itertools.product((0, 1), repeat=3)]
+        lines = [(a, b) for a, b in itertools.combinations(corners, 2) if np.count_nonzero(a != b) == 1]
+    else:
+        lines = _rings(boundary)
+    radius = 5e-4 * max(assembly.extent, max(float(np.linalg.norm(b - a)) for a, b in lines))
+    for i, (a, b) in enumerate(lines):
+        add(
+            world, "geom", name=f"boundary:{i}", class_="visual", type="capsule",
+            fromto=numbers((a, b)), size=number(radius), rgba=_WIRE_COLOR,
+        )  # fmt: skip
+
+
+def _rings(boundary: Boundary, segments: int = 48) -> list[tuple[Array, Array]]:
+    """Three great circles of a ball, one for a disc."""
+    center = np.zeros(3)
+    center[: len(boundary.center)] = boundary.center
+    angle = np.linspace(0, 2 * np.pi, segments + 1)
+    planes = [(0, 1)] if len(boundary.center) == 2 else [(0, 1), (1, 2), (2, 0)]
+    lines: list[tuple[Array, Array]] = []
+    for i, j in planes:
+        points = np.tile(center, (len(angle), 1))
+        points[:, i] += boundary.radius * np.cos(angle)
+        points[:, j] += boundary.radius * np.sin(angle)
+        lines += list(zip(points[:-1], points[1:], strict=True))
+    return lines
+
+
+def _add_walls(world: Element, boundary: Boundary, assembly: Assembly) -> None:
+    """Planes that face inwards: a box exactly, a ball by planes that touch it."""
+    planes: list[tuple[Array, Array]] = []
+    if boundary.lower:
+        for axis in range(len(boundary.lower)):
+            for sign, bound in ((1.0, boundary.lower), (-1.0, boundary.upper)):
+                normal, point = np.zeros(3), (assembly.lower + assembly.upper) / 2
+                normal[axis], point[axis] = sign, bound[axis]
+                planes.append((point, normal))
+    else:
+        dimension = len(boundary.center)
+        center = np.zeros(3)
+        center[:dimension] = boundary.center
+        planes = [(center - boundary.radius * n, n) for n in _directions(dimension)]
+    for i, (point, normal) in enumerate(planes):
+        add(
+            world, "geom", name=f"boundary:{i}", type="plane", group="4", pos=numbers(point), zaxis=numbers(normal),
+            size=numbers((assembly.extent, assembly.extent, assembly.extent / 20)), rgba="0.5 0.5 0.5 0.1",
+        )  # fmt: skip
+
+
+def _directions(dimension: int) -> list[Array]:
+    """Evenly spread unit vectors: 32 on a circle, 128 on a sphere (Fibonacci lattice)."""
+    if dimension == 2:
+        angle = np.arange(32) * (2 * np.pi / 32)
+        return list(np.stack([np.cos(angle), np.sin(angle), np.zeros(32)], axis=1))
+    i = np.arange(128)
+    z = 1 - (2 * i + 1) / 128
+    angle = i * np.pi * (3 - math.sqrt(5))
+    r = np.sqrt(1 - z * z)
+    return list(np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1))

@@ -1,0 +1,49 @@
+"""Writes MJCF text that is the same on every run: two-space indent, attributes in the order given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from lxml import etree
+from numpy.typing import ArrayLike
+
+Element = Any  # lxml's classes have no public names
+
+
+def number(value: float) -> str:
+    """Return the shortest text that reads back as the same double; no trailing `.0`, no negative zero."""
+    text = repr(float(value) + 0.0)
+    return text[:-2] if text.endswith(".0") else text
+
+
+def numbers(values: ArrayLike) -> str:
+    """Return blank-separated numbers of an array in C order."""
+    return " ".join(number(v) for v in np.asarray(values, dtype=np.float64).reshape(-1))
+
+
+def add(parent: Element, tag: str, **attributes: str | None) -> Element:
+    """Append an element; attributes that are None are left out, a trailing `_` of a name is dropped (`class_`)."""
+    element = etree.SubElement(parent, tag)
+    for name, value in attributes.items():
+        if value is not None:
+            element.set(name.rstrip("_"), value)
+    return element
+
+
+def comment(parent: Element, lines: Iterable[str]) -> None:
+    """Append a comment."""
+    parent.append(etree.Comment(comment_text(lines)))
+
+
+def comment_text(lines: Iterable[str]) -> str:
+    """Return the text of a comment; `--` and control characters cannot stand in one."""
+    lines = ["".join(c if c.isprintable() else "?" for c in line).replace("--", "- -") for line in lines]
+    return f" {lines[0]} " if len(lines) == 1 else "\n" + "\n".join(f"    {line}".rstrip() for line in lines) + "\n"
+
+
+def to_text(root: Element) -> str:
+    """Return the whole document, with a final newline."""
+    etree.indent(root, space="  ")
+    return etree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,91 @@
+"""The way from a file to a compiled scene: read, scale, assemble, choose pairs, compile. No MuJoCo."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import Diagnostic, DiagnosticLog
+from .formats.reading import read_scene
+from .geometry.assembly import Assembly, assemble
+from .mjcf.compiler import Document, compile_mjcf
+from .model import Environment, scaled
+from .names import dof_names
+from .options import Options, PathArgument
+from .pairs import PairTable, Robot, pair_table
+from .space import ConfigurationSpace
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A scene at the end of the pipeline.
+
+    Attributes:
+        environment: The scene in the words, and units, of its files.
+        assembly: The scene in metres, with geometry.
+        space: Its configuration space.
+        pairs: Which bodies are tested against each other.
+        document: Its MJCF.
+        options: The options that it was compiled with.
+        diagnostics: What all stages found.
+    """
+
+    environment: Environment
+    assembly: Assembly
+    space: ConfigurationSpace
+    pairs: PairTable
+    document: Document
+    options: Options
+    diagnostics: tuple[Diagnostic, ...]
+
+
+def compile_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Compiled:
+    """Take a file through the whole pipeline."""
+    environment = read_scene(path, options, log)
+    assembly = assemble(scaled(environment, options.scale), options, log)
+    return compile_assembly(environment, assembly, options, log)
+
+
+def compile_assembly(
+    environment: Environment, assembly: Assembly, options: Options, log: DiagnosticLog
+) -> Compiled:
+    """Take an assembled scene through the rest of the pipeline.
+
+    Raises:
+        ValueError: `exclude_pairs` names an unknown body.
+    """
+    space = configuration_space(assembly, options)
+    robots = [Robot(r.kinematics, r.names) for r in assembly.robots]
+    obstacles = [p.name for p in assembly.obstacles]
+    pairs = pair_table(robots, obstacles, options, environment.planner_rules)
+    document = compile_mjcf(assembly, space, pairs, options, log)
+    return Compiled(environment, assembly, space, pairs, document, options, tuple(log))
+
+
+def recompile(compiled: Compiled, exclude: Sequence[tuple[str, str]], log: DiagnosticLog) -> Compiled:
+    """Compile a scene again with more pairs excluded."""
+    options = dataclasses.replace(compiled.options, exclude_pairs=(*compiled.options.exclude_pairs, *exclude))
+    return compile_assembly(compiled.environment, compiled.assembly, options, log)
+
+
+def configuration_space(assembly: Assembly, options: Options) -> ConfigurationSpace:
+    """Build the configuration space of an assembled scene."""
+    space = ConfigurationSpace(
+        [r.kinematics for r in assembly.robots],
+        [n for r in assembly.robots for n in dof_names(r.names, r.kinematics.dofs)],
+        [r.home for r in assembly.robots],
+        assembly.environment.boundary,
+        options.scale,
+    )
+    radius = max((r.radius for r in assembly.robots), default=0.0)
+    if assembly.obstacles:
+        corners = np.concatenate(
+            [p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles]
+        )
+        space.set_sample_box(corners.min(axis=0) - radius, corners.max(axis=0) + radius)
+    else:
+        space.set_sample_box(np.full(3, -2 * radius), np.full(3, 2 * radius))
+    return space

@@ -1,0 +1,106 @@
+"""What a conversion did, in numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from .pipeline import Compiled
+
+
+@dataclass(frozen=True, slots=True)
+class MeshReport:
+    """What became of one mesh.
+
+    Attributes:
+        file: The mesh as the scene names it.
+        triangles: Number of triangles.
+        closed, convex: What it is like.
+        cells: Number of convex pieces that collide for it.
+        note: How it was represented, in a sentence.
+    """
+
+    file: str
+    triangles: int
+    closed: bool
+    convex: bool
+    cells: int
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A scene in numbers.
+
+    Attributes:
+        name, dialect, semantics, collision: What was read, and how.
+        robots, links, obstacles, surfaces: Numbers of each.
+        dof: Degrees of freedom of all robots.
+        pairs: Number of tested pairs.
+        geoms: Geoms of the model that collide.
+        mass: Mass of all links, kg.
+        extent: Diagonal of the bounding box at home, metres.
+        meshes: One entry for each mesh.
+        diagnostics: Number of diagnostics by severity.
+    """
+
+    name: str
+    dialect: str
+    semantics: str
+    collision: str
+    robots: int
+    links: int
+    obstacles: int
+    surfaces: int
+    dof: int
+    pairs: int
+    geoms: int
+    mass: float
+    extent: float
+    meshes: tuple[MeshReport, ...]
+    diagnostics: dict[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values, for JSON."""
+        return dataclasses.asdict(self)
+
+
+def report(compiled: Compiled) -> Report:
+    """Sum a compiled scene up."""
+    environment, assembly = compiled.environment, compiled.assembly
+    meshes: dict[tuple[str, str], MeshReport] = {}
+    for part in assembly.parts():
+        shape = part.shape
+        meshes.setdefault(
+            (part.body.filename, part.mesh.digest),
+            MeshReport(
+                part.body.filename,
+                len(part.mesh.faces),
+                part.analysis.closed,
+                part.analysis.convex,
+                len(shape.pieces) if shape else 0,
+                shape.note if shape else "drawn only",
+            ),
+        )
+    counts: dict[str, int] = {}
+    for diagnostic in compiled.diagnostics:
+        counts[diagnostic.severity.value] = counts.get(diagnostic.severity.value, 0) + 1
+    links = [p for r in assembly.robots for p in r.links]
+    return Report(
+        name=environment.name,
+        dialect=environment.dialect.value,
+        semantics=environment.semantics,
+        collision=compiled.options.collision,
+        robots=len(assembly.robots),
+        links=len(links),
+        obstacles=len(assembly.obstacles),
+        surfaces=len(assembly.surfaces),
+        dof=compiled.space.dim,
+        pairs=len(compiled.pairs.tested),
+        geoms=len(compiled.document.owners),
+        mass=sum(p.inertial.mass for p in links if p.inertial),
+        extent=assembly.extent,
+        meshes=tuple(meshes.values()),
+        diagnostics=counts,
+    )

@@ -1,0 +1,82 @@
+"""From a file to a loaded scene, with a look at what touches at home."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from ..contact.types import Contact
+from ..errors import DiagnosticLog, KinematicsError
+from ..model import Dialect
+from ..options import Options, PathArgument
+from ..pipeline import Compiled, compile_scene, recompile
+from .loading import load_model
+from .scene import Scene
+
+
+def load(path: PathArgument, **options: Any) -> Scene:
+    """Load a scene into MuJoCo; nothing is written.
+
+    Args:
+        path: An env file of any dialect, an XML environment, or the planner's problem XML.
+        **options: Fields of `Options`.
+
+    Raises:
+        FormatError: A text file cannot be read.
+        GeometryError: A mesh is missing or unusable.
+        KinematicsError: The bodies of a robot do not hang together.
+        ConversionError: MuJoCo cannot express, or refuses, the scene.
+        NotImplementedError: A value of an option is not available yet.
+        TypeError: An unknown option.
+        ValueError: A value that an option cannot take.
+    """
+    chosen = Options.from_keywords(options)
+    return prepare(path, chosen, DiagnosticLog(chosen.strict))
+
+
+def prepare(path: PathArgument, options: Options, log: DiagnosticLog) -> Scene:
+    """Load a scene with options already checked; see `load`."""
+    if options.engine == "exact":
+        raise NotImplementedError("engine='exact' is not available yet; use engine='mujoco' or 'auto'")
+    compiled = compile_scene(path, options, log)
+    scene = _scene(compiled, log)
+    touching = _touching_pairs(scene.contacts(scene.space.home)) if scene.link_names else {}
+    if touching and options.exclude_rest_contacts:
+        names = ", ".join(f"{a} and {b}" for a, b in touching)
+        log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {names}")
+        # The first compilation has reported everything else already.
+        return _scene(recompile(compiled, list(touching), DiagnosticLog()), log)
+    for (link, other), contact in touching.items():
+        _report_touching(compiled, link, other, contact, log)
+    return scene.with_diagnostics(tuple(log))
+
+
+def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
+    model = load_model(compiled.document, compiled.assembly, log)
+    return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
+
+
+def _touching_pairs(contacts: list[Contact]) -> dict[tuple[str, str], Contact]:
+    """Return the deepest contact of each pair."""
+    deepest: dict[tuple[str, str], Contact] = {}
+    for contact in contacts:
+        key = (contact.link, contact.other)
+        if key not in deepest or contact.distance < deepest[key].distance:
+            deepest[key] = contact
+    return deepest
+
+
+def _report_touching(compiled: Compiled, link: str, other: str, contact: Contact, log: DiagnosticLog) -> None:
+    body = next(p.body for p in compiled.assembly.parts() if p.name == link)
+    if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
+        # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
+        log.info(
+            "KIN312", link, f"{link} and {other} touch at home, where the base is at the origin",
+            hint="simulate from a query's start: key 'start'", span=body.span,
+        )  # fmt: skip
+        return
+    log.warn(
+        KinematicsError, "KIN312", link, f"{link} and {other} touch at home",
+        hint="exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch",
+        span=body.span,
+    )  # fmt: skip

@@ -1,0 +1,390 @@
+"""A scene in MuJoCo: simulate it, place its robots, ask what touches."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..contact.batch import in_chunks
+from ..contact.boundary import BoundaryTest
+from ..contact.containment import Containment
+from ..contact.engine import MujocoEngine
+from ..contact.paths import EdgeSteps, check_path
+from ..contact.static_pairs import static_contacts
+from ..contact.types import Contact, PathReport
+from ..errors import Diagnostic
+from ..geometry.assembly import Part
+from ..model import Environment
+from ..options import Engine
+from ..pipeline import Compiled
+from ..report import Report, report
+from ..space import ConfigurationSpace
+from ..transforms import Array
+from .loading import load_spec
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """Configurations to be visited in turn.
+
+    Attributes:
+        robot: Index of the robot that moves.
+        q: (k, dim) start, via and goal configurations, the other robots at home.
+        label: Name of the task, where a problem file gives one.
+    """
+
+    robot: int
+    q: Array
+    label: str = ""
+
+
+class Scene:
+    """A scene loaded into MuJoCo.
+
+    Configurations q are float64, (dim,) or (n, dim), in metres and radians, in the planner's order of the degrees of
+    freedom. A single row gives a Python bool or float, n rows an (n,) array. A wrong shape, a NaN or an infinity is a
+    ValueError that names the degree of freedom. Queries leave `data` alone and may run in several threads.
+
+    Attributes:
+        model: The compiled model.
+        space: The configuration space.
+        environment: The scene in the words, and units, of its files.
+        diagnostics: What all stages found.
+    """
+
+    def __init__(self, compiled: Compiled, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.space: ConfigurationSpace = compiled.space
+        self.environment: Environment = compiled.environment
+        self.diagnostics: tuple[Diagnostic, ...] = compiled.diagnostics
+        self._compiled = compiled
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Build what is not pickled: everything that follows from the model and the compiled scene."""
+        compiled, model = self._compiled, self.model
+        assembly, document = compiled.assembly, compiled.document
+        self._data: mujoco.MjData | None = None
+        self._lock = threading.Lock()
+        self._scratch = threading.local()
+        self._engine = MujocoEngine(model, document.owners)
+        self._links = [p for r in assembly.robots for p in r.links]
+        self._bodies = np.array([model.body(p.name).id for p in self._links], dtype=np.int64)
+        self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
+        self._pair_of = {frozenset((p.link, p.other)): p for p in compiled.pairs.tested}
+        self._boundary = BoundaryTest(assembly.environment.boundary, self._links)
+        self._containment = Containment(compiled.pairs.tested, self._parts)
+        self._steps = EdgeSteps(assembly, self.space)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        self._static = static_contacts(model, data, compiled.pairs.tested, document.owners)
+
+    # What the scene is.
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The scene's simulation state; at home when it is first asked for."""
+        with self._lock:
+            if self._data is None:
+                self._data = mujoco.MjData(self.model)
+                if self.model.nkey:
+                    mujoco.mj_resetDataKeyframe(self.model, self._data, 0)
+                mujoco.mj_forward(self.model, self._data)
+            return self._data
+
+    @property
+    def xml(self) -> str:
+        """The MJCF text."""
+        return self._compiled.document.xml
+
+    @property
+    def assets(self) -> dict[str, bytes]:
+        """Contents of the files that the MJCF refers to, by path relative to it."""
+        return dict(self._compiled.document.assets)
+
+    @property
+    def report(self) -> Report:
+        """What was converted, in numbers."""
+        return report(self._compiled)
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of the bounding box of all bodies at home, in metres: the unit of every tolerance."""
+        return self._compiled.assembly.extent
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """All robot bodies, in file order."""
+        return tuple(p.name for p in self._links)
+
+    @property
+    def obstacle_names(self) -> tuple[str, ...]:
+        """All obstacle bodies, in file order."""
+        return tuple(p.name for p in self._compiled.assembly.obstacles)
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Every tested pair of names."""
+        return tuple((p.link, p.other) for p in self._compiled.pairs.tested)
+
+    @property
+    def queries(self) -> tuple[Query, ...]:
+        """The tasks of the query file or problem XML, decoded."""
+        return tuple(Query(t.robot, self.space.of_task(t), t.label) for t in self.environment.tasks)
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return the scene as a new MjSpec, to be attached to another one."""
+        return load_spec(self._compiled.document)
+
+    @property
+    def compiled(self) -> Compiled:
+        """What the scene was loaded from."""
+        return self._compiled
+
+    def with_diagnostics(self, diagnostics: tuple[Diagnostic, ...]) -> Scene:
+        """Return the scene with these diagnostics."""
+        if diagnostics == self.diagnostics:
+            return self
+        return Scene(dataclasses.replace(self._compiled, diagnostics=diagnostics), self.model)
+
+    # Where things are.
+
+    def set(self, q: ArrayLike) -> None:
+        """Put the robots of `data` at q, at rest, and run `mj_forward`."""
+        row = self._row(q)
+        data = self.data
+        data.qpos[:] = self.space.qpos(row)
+        data.qvel[:] = 0
+        mujoco.mj_forward(self.model, data)
+
+    def q(self) -> Array:
+        """Return the configuration that `data` holds, (dim,)."""
+        return self.space.from_qpos(self.data.qpos)
+
+    def link_poses(self, q: ArrayLike) -> Array:
+        """Return the world poses of all robot bodies out of MuJoCo's kinematics, (..., nlinks, 4, 4)."""
+        rows = self.space.check(q)
+        poses = self._link_poses(np.atleast_2d(rows))
+        return poses if rows.ndim == 2 else poses[0]
+
+    def obstacle_poses(self) -> Array:
+        """Return the world poses of all obstacles, (m, 4, 4)."""
+        return np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
+
+    def loop_error(self, q: ArrayLike) -> float | Array:
+        """Return how far the worst closed loop is from closed, in metres; 0.0 without loops.
+
+        The greatest distance, over the ball around a loop's last link, between where the chain puts a point and where
+        the loop-closing connection would.
+        """
+        return self._scalar_or_rows(q, self._loop_errors)
+
+    # Verdicts.
+
+    def in_collision(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+        engine: Engine | None = None,
+    ) -> Any:
+        """Return whether any tested pair touches.
+
+        Args:
+            q: Configurations, (dim,) or (n, dim).
+            threads: Number of threads; None is 1 below 10,000 rows, else all cores.
+            executor: Not available yet.
+            progress: Show a progress bar on a terminal.
+            engine: Override the scene's engine.
+
+        Returns:
+            A bool, or (n,) bools.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite.
+            NotImplementedError: The engine or the executor is not available yet.
+        """
+        _only_available(engine or "auto", executor)
+        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._collisions, threads, progress))
+
+    def is_valid(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+        engine: Engine | None = None,
+    ) -> Any:
+        """Return whether q is within limits, every vertex is inside the boundary, and nothing collides.
+
+        Arguments, result and errors are those of `in_collision`.
+        """
+        _only_available(engine or "auto", executor)
+        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._validities, threads, progress))
+
+    def contacts(self, q: ArrayLike) -> list[Contact]:
+        """Return every contact of one configuration, pairs that cannot move included."""
+        row = self._row(q)
+        found: list[Contact] = []
+        for a, b, position, normal, distance in self._engine.touching(self.space.qpos(row), self._thread_data()):
+            pair = self._pair_of[frozenset((a, b))]
+            direction = normal if a == pair.link else -normal
+            found.append(Contact(pair.link, pair.other, pair.kind, position, direction, distance))
+        return found + list(self._static) + self._contained(row, found)
+
+    def clearance(self, q: ArrayLike) -> float | Array:
+        """Not available yet: exact clearance needs the triangle engine.
+
+        Raises:
+            NotImplementedError: Always.
+        """
+        self.space.check(q)
+        raise NotImplementedError("clearance() is not available yet; contacts() and in_collision() are")
+
+    # Edges and paths.
+
+    def edge_in_collision(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None) -> Any:
+        """Return whether anything touches on the straight way between two configurations, ends included.
+
+        Args:
+            q0, q1: (dim,) or (n, dim).
+            resolution: Greatest distance in metres that any point of a robot moves between two checks; None takes
+                the file's PositionRes, else 0.01 extent.
+
+        Raises:
+            ValueError: q0 and q1 differ in shape, or the resolution is not positive.
+        """
+        start, end = self.space.check(q0), self.space.check(q1)
+        if start.shape != end.shape:
+            raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
+        if start.ndim == 1:
+            return bool(self._collisions(self._steps.rows(start, end, resolution)).any())
+        edges = (self._steps.rows(a, b, resolution) for a, b in zip(start, end, strict=True))
+        return np.array([self._collisions(rows).any() for rows in edges], dtype=bool)
+
+    def edge_is_free(self, q0: ArrayLike, q1: ArrayLike) -> Any:
+        """Not available yet: a certified edge needs exact clearance.
+
+        Raises:
+            NotImplementedError: Always.
+        """
+        self.space.check(q0), self.space.check(q1)
+        raise NotImplementedError("edge_is_free() is not available yet; edge_in_collision() checks in steps")
+
+    def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
+        """Check the validity of a path's configurations and of the straight edges between them.
+
+        Args:
+            path: (k, dim).
+            resolution: As for `edge_in_collision`.
+
+        Raises:
+            ValueError: The path has a wrong shape, or the resolution is not positive.
+        """
+        return check_path(path, self._steps, self._validities, self.contacts, self.space, resolution)
+
+    # Pickling: the model and the compiled scene travel, the rest is built again.
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"compiled": self._compiled, "model": self.model}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["compiled"], state["model"])
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        return Scene(self._compiled, copy.copy(self.model))
+
+    def __repr__(self) -> str:
+        robots = len(self._compiled.assembly.robots)
+        return (
+            f"<Scene {self.environment.name!r}: {robots} robot{'' if robots == 1 else 's'}, {len(self._links)} links, "
+            f"{self.space.dim} degrees of freedom, {len(self.obstacle_names)} obstacles>"
+        )
+
+    def _row(self, q: ArrayLike) -> Array:
+        row = self.space.check(q)
+        if row.ndim != 1:
+            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
+        return row
+
+    def _scalar_or_rows(self, q: ArrayLike, answer: Callable[[Array], NDArray[Any]]) -> Any:
+        rows = self.space.check(q)
+        answers = answer(np.atleast_2d(rows) if rows.ndim == 1 else rows)
+        return answers if rows.ndim == 2 else answers[0].item()
+
+    def _thread_data(self) -> mujoco.MjData:
+        data = getattr(self._scratch, "data", None)
+        if data is None:
+            data = self._scratch.data = self._engine.data()
+        return data
+
+    def _link_poses(self, rows: Array) -> Array:
+        return self._engine.body_poses(self.space.qpos(rows), self._bodies, self._thread_data())
+
+    def _loop_errors(self, rows: Array) -> Array:
+        worst = np.zeros(len(rows))
+        for robot, columns in zip(self._compiled.assembly.robots, self.space.robot_slices, strict=True):
+            gaps = robot.kinematics.loop_gaps(rows[:, columns], [p.radius for p in robot.links])
+            worst = np.maximum(worst, gaps.max(axis=-1, initial=0.0))
+        return worst
+
+    def _collisions(self, rows: Array) -> NDArray[np.bool_]:
+        if self._static:
+            return np.ones(len(rows), dtype=bool)
+        hits = self._engine.collide(self.space.qpos(rows), self._thread_data())
+        free = ~hits
+        if self._containment.needed and free.any():
+            hits[free] = self._containment.inside(self._poses_by_name(rows[free]))
+        return hits
+
+    def _validities(self, rows: Array) -> NDArray[np.bool_]:
+        valid = self.space.within_limits(rows)
+        if valid.any():
+            valid[valid] = self._boundary.inside(self._link_poses(rows[valid]))
+        if valid.any():
+            valid[valid] = ~self._collisions(rows[valid])
+        return valid
+
+    def _poses_by_name(self, rows: Array) -> dict[str, Array]:
+        poses = self._link_poses(rows)
+        by_name = {p.name: poses[:, i] for i, p in enumerate(self._links)}
+        for part in self._compiled.assembly.obstacles:
+            by_name[part.name] = np.broadcast_to(part.pose, (len(rows), 4, 4))
+        return by_name
+
+    def _contained(self, row: Array, touching: Sequence[Contact]) -> list[Contact]:
+        """Return contacts of bodies that lie wholly inside others; their normals point along the bodies' centres."""
+        if not self._containment.needed:
+            return []
+        poses = self._poses_by_name(row[None])
+        seen = {(c.link, c.other) for c in touching}
+        found: list[Contact] = []
+        for index, point in self._containment.pairs_inside(poses):
+            pair = self._compiled.pairs.tested[index]
+            if (pair.link, pair.other) in seen:
+                continue
+            apart = poses[pair.other][0, :3, 3] - poses[pair.link][0, :3, 3]
+            length = float(np.linalg.norm(apart))
+            normal = apart / length if length else np.array([0.0, 0.0, 1.0])
+            depth = -min(self._parts[pair.link].mesh.diagonal, self._parts[pair.other].mesh.diagonal)
+            found.append(Contact(pair.link, pair.other, pair.kind, point, normal, depth))
+        return found
+
+
+def _only_available(engine: str, executor: Executor | None) -> None:
+    if engine == "exact":
+        raise NotImplementedError("engine='exact' is not available yet; use engine='mujoco'")
+    if executor is not None:
+        raise NotImplementedError("executor=... is not available yet; use threads=...")
