@@ -53,7 +53,7 @@ class Mesh:
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Mesh:
         """Translate it."""
-        return replace(self, vertices=self.vertices + (x, y, z))
+        return replace(self, vertices=self.vertices + np.array([x, y, z]))
 
     def rolled(self, steps: int = 1) -> Mesh:
         """Rename the axes in a circle: after one step, what pointed along z points along x."""
@@ -124,7 +124,7 @@ def blocks(
 def _cut(planes: Sequence[float], most: float) -> tuple[list[float], list[int]]:
     """Return planes at most `most` apart, and for each cell between them the cell that it is of."""
     result, owner = [planes[0]], list[int]()
-    for cell, (a, b) in enumerate(zip(planes, planes[1:], strict=False)):
+    for cell, (a, b) in enumerate(itertools.pairwise(planes)):
         pieces = max(1, math.ceil(round((b - a) / most, 9)))
         result += [a + (b - a) * (k + 1) / pieces for k in range(pieces)]
         owner += [cell] * pieces
@@ -242,7 +242,7 @@ def tube(path: Points, radius: float, sides: int) -> Mesh:
     vertices += [path[0], path[-1]]
     return Mesh.of(
         [v.tolist() for v in vertices],
-        [_strip(a, b, k) for a, b in zip(rings, rings[1:], strict=False) for k in range(sides)],
+        [_strip(a, b, k) for a, b in itertools.pairwise(rings) for k in range(sides)],
     )
 
 
@@ -369,7 +369,7 @@ def seed() -> Files:
 
 
 def gantry() -> Files:
-    """Three slides and a wrist on a fixed frame (dialect A); its meshes are of quadrilaterals."""
+    """Three slides and a wrist on a fixed frame (dialect A); the frame is of quadrilaterals."""
     legs_and_rails = blocks(
         grid(1.6, 1.48),
         grid(1.2, 1.06),
@@ -380,15 +380,14 @@ def gantry() -> Files:
     frame, (_, _, frame_z) = legs_and_rails.recentred()
     fork = blocks(grid(0.15, 0.1), (-0.05, 0.05), (-0.24, -0.06, 0), lambda i, j, k: k == 1 or i != 1)
     gripper, (_, _, gripper_z) = fork.recentred()
-    solids = {
-        "frame": frame,
-        "bridge": blocks(grid(0.2, 0.12), grid(1.2, 1.06), (-0.06, 0.06), lambda i, j, k: (i, j) != (1, 1), most=0.8),
-        "trolley": blocks(grid(0.2, 0.08), grid(0.2, 0.08), (-0.06, 0.06), lambda i, j, k: (i, j) != (1, 1)),
-        "column": box(0.12, 0.12, 1.6),
-        "gripper": gripper,
-        "table": box(2.6, 1.9, 0.3),
-        "crate": box(0.4, 0.3, 0.2),
-    }
+    solids = meshes(
+        bridge=blocks(grid(0.2, 0.12), grid(1.2, 1.06), (-0.06, 0.06), lambda i, j, k: (i, j) != (1, 1), most=0.8),
+        trolley=blocks(grid(0.2, 0.08), grid(0.2, 0.08), (-0.06, 0.06), lambda i, j, k: (i, j) != (1, 1)),
+        column=box(0.12, 0.12, 1.6),
+        gripper=gripper,
+        table=box(2.6, 1.9, 0.3),
+        crate=box(0.4, 0.3, 0.2),
+    )
     # A connection's numbers: DH frame to body, DH row, kind, body to DH frame. The slide is the DH frame's z axis.
     environment = page(f"""
         3
@@ -435,8 +434,7 @@ def gantry() -> Files:
         -0.6 -0.4 -0.5 0
         0.9 0.5 -0.5 0.25
     """)
-    quads = {f"{name}.g": solid.byu() for name, solid in solids.items()}
-    return {"gantry.env": environment, "gantry.query": query, **quads}
+    return {"gantry.env": environment, "gantry.query": query, "frame.g": frame.byu(), **solids}
 
 
 def spherical_arm() -> Files:

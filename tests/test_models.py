@@ -112,13 +112,13 @@ def test_a_mesh_is_a_closed_surface_seen_from_outside(path: Path) -> None:
 
 
 def test_quadrilaterals_and_parts_occur() -> None:
-    corners = {p.parent.name: {len(c) for c in read_g(p)[1]} for p in MODELS.glob("gantry/*.g")}
-    assert corners == {"gantry": {4}}
+    assert {len(corners) for corners in read_g(MODELS / "gantry/frame.g")[1]} == {4}
     assert (MODELS / "two-robots/meshes/car.g").read_text().startswith("5 ")
 
 
 def test_the_seed_is_the_pages_example() -> None:
-    page = """3 MultiBody Active 4 FreeBody 0 cube.g 0 0 0 0 0 0 FreeBody 1 link1.g FreeBody 2 link2.g FreeBody 3 link3.g
+    page = """3 MultiBody Active 4
+        FreeBody 0 cube.g 0 0 0 0 0 0 FreeBody 1 link1.g FreeBody 2 link2.g FreeBody 3 link3.g
         Connection 3 0 1 Actuated 0.2 0 0 -90 0 0 90 0.2 0 30 Revolute 0 0 0 0 0 0
         1 2 Actuated 0.2 0 0 -90 0 0 90 0.2 0 30 Revolute 0 0 0 0 0 0
         2 3 Actuated 0.2 0 0 -90 0 0 90 0.2 0 30 Revolute 0 0 0 0 0 0
@@ -150,7 +150,7 @@ def _planar(row: list[float], theta: float) -> np.ndarray:
 def test_a_scene_reads_without_warnings(scene: str) -> None:
     environment = read(scene)
     assert [d for d in environment.diagnostics if d.severity != "info"] == []
-    dialect, dofs = DIALECTS_AND_DOFS[scene.split("/")[0]]
+    dialect, dofs = DIALECTS_AND_DOFS[scene.split("/", maxsplit=1)[0]]
     assert environment.dialect == dialect
     assert len(environment.robots) == len(dofs)
     for task in environment.tasks:
