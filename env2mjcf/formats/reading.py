@@ -70,7 +70,10 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
             hint="give a robot file with robots=[...] (--robots)",
         )  # fmt: skip
     tasks = _tasks(environment, problem, own, options, log)
-    return dataclasses.replace(environment, tasks=tasks, path=source.path, diagnostics=tuple(log))
+    # A problem lends the scene its own name: several problems may share one environment.
+    return dataclasses.replace(
+        environment, name=Path(source.path).stem, tasks=tasks, path=source.path, diagnostics=tuple(log)
+    )
 
 
 def robot_dofs(environment: Environment, log: DiagnosticLog) -> list[int]:

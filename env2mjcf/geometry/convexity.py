@@ -76,32 +76,45 @@ def _distinct(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
 
 
 def _all_behind(vertices: Floats, normals: Floats, offsets: Floats, tolerance: float) -> bool:
-    """Test every vertex against every plane, skipping clusters of vertices whose bounding box lies behind it."""
-    clusters = _clusters(vertices)  # (c, s, 3)
-    middle = (clusters.min(axis=1) + clusters.max(axis=1)) / 2
-    half = np.ptp(clusters, axis=1) / 2
-    step = max(1, _BLOCK // len(clusters))
+    """Test every vertex against every plane, down a tree of boxes: what lies wholly behind a plane is not opened."""
+    boxes, leaves = _tree(vertices)
+    step = max(1, _BLOCK // 256)
     for i in range(0, len(normals), step):
         normal, limit = normals[i : i + step], offsets[i : i + step] + tolerance
-        plane, cluster = np.nonzero(normal @ middle.T + np.abs(normal) @ half.T > limit[:, None])
-        per_block = max(1, _BLOCK // clusters.shape[1])
+        plane, node = np.arange(len(normal)), np.zeros(len(normal), dtype=np.int64)
+        for depth, (middle, half) in enumerate(boxes):
+            if depth:
+                plane, node = np.repeat(plane, 2), (2 * node[:, None] + (0, 1)).ravel()
+            reach = np.einsum("ij,ij->i", normal[plane], middle[node])
+            reach += np.einsum("ij,ij->i", np.abs(normal[plane]), half[node])
+            plane, node = plane[reach > limit[plane]], node[reach > limit[plane]]
+        per_block = max(1, _BLOCK // leaves.shape[1])
         for j in range(0, len(plane), per_block):
-            p, c = plane[j : j + per_block], cluster[j : j + per_block]
-            if ((clusters[c] @ normal[p][:, :, None])[:, :, 0].max(axis=1) > limit[p]).any():
+            p = plane[j : j + per_block]
+            heights = (leaves[node[j : j + per_block]] @ normal[p][:, :, None])[:, :, 0]
+            if (heights.max(axis=1) > limit[p]).any():
                 return False
     return True
 
 
-def _clusters(vertices: Floats, size: int = 64) -> Floats:
-    """Split points at medians into clusters of equal size, (c, s, 3); some points are repeated to fill them."""
+def _tree(vertices: Floats, size: int = 8) -> tuple[list[tuple[Floats, Floats]], Floats]:
+    """Split points at medians.
+
+    Returns:
+        Middles and half sides, (2**depth, 3), of the boxes at each depth, and the leaves' points, (leaves, size, 3),
+        some of them twice where the number does not divide.
+    """
     count = 1 << max(0, int(np.ceil(np.log2(len(vertices) / size))))
-    each = -(-len(vertices) // count)
-    parts = np.resize(vertices, (each * count, 3))[None]
-    while len(parts) < count:
-        axis = np.ptp(parts, axis=1).argmax(axis=1)
-        order = np.argsort(np.take_along_axis(parts, axis[:, None, None], axis=2)[:, :, 0], axis=1)
+    parts = np.resize(vertices, (-(-len(vertices) // count) * count, 3))[None]
+    boxes: list[tuple[Floats, Floats]] = []
+    while True:
+        low, high = parts.min(axis=1), parts.max(axis=1)
+        boxes.append(((low + high) / 2, (high - low) / 2))
+        if len(parts) == count:
+            return boxes, parts
+        along = np.take_along_axis(parts, (high - low).argmax(axis=1)[:, None, None], axis=2)[:, :, 0]
+        order = np.argsort(along, axis=1, kind="stable")
         parts = np.take_along_axis(parts, order[:, :, None], axis=1).reshape(2 * len(parts), -1, 3)
-    return parts
 
 
 def exact_box(vertices: Floats, faces: Ints, tolerance: float) -> Box | None:

@@ -62,13 +62,10 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         Prisms in the order of the polygons. One of a polygon too narrow for MuJoCo is widened, by less than
         `thickness`.
     """
-    loops = [_corners(vertices, polygon.loop) for polygon in polygons]
-    by_length: dict[int, list[int]] = {}
-    for i, loop in enumerate(loops):
-        by_length.setdefault(len(loop), []).append(i)
+    loops = _corner_loops(vertices, polygons)
     out: list[ConvexPiece | None] = [None] * len(polygons)
     below, above = (-thickness, 0.0) if inward else (-thickness / 2, thickness / 2)
-    for members in by_length.values():
+    for members in _by_length(loops):
         corners = vertices[np.array([loops[i] for i in members])]  # (g, k, 3)
         normals = np.array([polygons[i].normal for i in members])
         centers = corners.mean(axis=1)
@@ -88,25 +85,40 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
     return tuple(piece for piece in out if piece is not None)
 
 
-def _corners(vertices: Floats, loop: tuple[int, ...]) -> tuple[int, ...]:
-    """Leave out the vertices of a convex loop at which it goes straight on: its hull does not need them."""
-    if len(loop) == 3:
-        return loop
-    points = vertices[list(loop)]
-    tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    turn = np.linalg.norm(np.cross(before, after), axis=1)
-    bends = turn > tolerance * np.linalg.norm(before + after, axis=1)
-    if bends.all():
-        return loop
-    # Many small turns in a row are a curve: what is left out is measured from the last vertex that stays.
-    start = int(np.argmax(turn))
-    kept = [start]
-    for i in range(start + 1, start + len(loop)):
-        u, v = points[i % len(loop)] - points[kept[-1]], after[i % len(loop)]
-        if np.linalg.norm(np.cross(u, v)) > tolerance * np.linalg.norm(u + v):
-            kept.append(i % len(loop))
-    return tuple(loop[i] for i in kept)
+def _corner_loops(vertices: Floats, polygons: Sequence[Polygon]) -> list[tuple[int, ...]]:
+    """Return the loops without vertices at which they go straight on: the hull does not need those."""
+    out = [polygon.loop for polygon in polygons]
+    for members in _by_length(out):
+        if len(out[members[0]]) == 3:
+            continue
+        points = vertices[np.array([out[i] for i in members])]
+        tolerance = RELATIVE_TOLERANCE * np.linalg.norm(np.ptp(points, axis=1), axis=1)
+        bends = _height(np.roll(points, 1, axis=1), points, np.roll(points, -1, axis=1)) > tolerance[:, None]
+        for row in np.flatnonzero(~bends.all(axis=1)):
+            # Many small turns in a row are a curve: measure against the chord between the corners around them.
+            corner = np.flatnonzero(bends[row])
+            if len(corner) < 3:
+                continue
+            after = np.searchsorted(corner, np.arange(len(points[row])))
+            chord = points[row, corner[after - 1]], points[row, corner[after % len(corner)]]
+            stays = bends[row] | (_height(chord[0], points[row], chord[1]) > tolerance[row])
+            out[members[row]] = tuple(np.array(out[members[row]])[stays].tolist())
+    return out
+
+
+def _by_length(loops: Sequence[tuple[int, ...]]) -> list[list[int]]:
+    groups: dict[int, list[int]] = {}
+    for i, loop in enumerate(loops):
+        groups.setdefault(len(loop), []).append(i)
+    return list(groups.values())
+
+
+def _height(start: Floats, point: Floats, end: Floats) -> Floats:
+    """Return the distance of points from the lines through `start` and `end`, (..., 3) each."""
+    chord = end - start
+    length = np.linalg.norm(chord, axis=-1)
+    area = np.linalg.norm(np.cross(point - start, chord), axis=-1)
+    return np.divide(area, length, out=np.zeros_like(area), where=length > 0)
 
 
 def _least_width(length: Floats, thickness: float) -> Floats:

@@ -1,0 +1,93 @@
+"""From words of the command line to a verb, through tyro."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Protocol, TypeVar
+
+import tyro
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
+
+from ..options import Options, PathArgument
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """How a verb reports.
+
+    Attributes:
+        json: Print the result as JSON.
+        verbose: Show diagnostics that are only worth knowing, too.
+        debug: Show a traceback when something fails.
+    """
+
+    json: bool = False
+    verbose: bool = False
+    debug: bool = False
+
+
+# Both stand flat among a verb's own flags.
+OutputFlags = Annotated[Output, tyro.conf.arg(name="")]
+OptionFlags = Annotated[Options, tyro.conf.arg(name="")]
+
+
+class Verb(Protocol):
+    """What every verb is: a dataclass of its arguments that can be run."""
+
+    @property
+    def output(self) -> Output:
+        """How it reports."""
+        ...
+
+    def run(self) -> int:
+        """Do it, and return the exit status."""
+        ...
+
+
+V = TypeVar("V", bound=Verb)
+
+
+def parse(verb: type[V], name: str, words: Sequence[str]) -> V:
+    """Turn words into a verb.
+
+    Raises:
+        SystemExit: Help was asked for (0), or the words are wrong (2); tyro has said so.
+    """
+    return tyro.cli(
+        verb,
+        prog=f"env2mjcf {name}",
+        # tyro would drop the examples.
+        description=inspect.cleandoc(verb.__doc__ or "").split("\n\nAttributes:")[0],
+        args=list(words),
+        registry=_paths_as_text(),
+        config=(tyro.conf.DisallowNone,),
+    )
+
+
+def keywords(options: Options) -> dict[str, Any]:
+    """Return options as keyword arguments of the API, which checks them."""
+    return {f.name: getattr(options, f.name) for f in dataclasses.fields(options)}
+
+
+def _paths_as_text() -> ConstructorRegistry:
+    """Teach tyro that a path argument is a word."""
+    registry = ConstructorRegistry()
+
+    @registry.primitive_rule
+    def path_rule(  # pyright: ignore[reportUnusedFunction]
+        info: PrimitiveTypeInfo,
+    ) -> PrimitiveConstructorSpec[str | None] | None:
+        if info.type not in (PathArgument, PathArgument | None):
+            return None
+        return PrimitiveConstructorSpec(
+            nargs=1,
+            metavar="PATH",
+            instance_from_str=lambda words: words[0],
+            is_instance=lambda value: value is None or isinstance(value, str),
+            str_from_instance=lambda value: [str(value)],
+        )
+
+    return registry

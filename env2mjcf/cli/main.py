@@ -1,0 +1,124 @@
+"""The program `env2mjcf`: finds the verb, runs it, turns what goes wrong into an exit status."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+
+from ..errors import Env2MjcfError, did_you_mean
+from .arguments import Verb, parse
+from .printing import one_line, print_diagnostics, print_json
+
+DONE, FINDING, WRONG_USAGE, BAD_INPUT, FAULT = range(5)
+# What shells report for a program that is stopped by SIGINT or SIGPIPE.
+_INTERRUPTED, _BROKEN_PIPE = 130, 141
+
+# Each verb: its module here, its class there, what it does.
+VERBS = {
+    "convert": ("convert", "Convert", "write a scene as a folder of MJCF and assets"),
+    "info": ("info", "Info", "say what a scene holds and how it is read"),
+    "check": ("check", "Check", "tell whether configurations are valid, and who touches whom"),
+    "lint": ("lint", "Lint", "list everything doubtful in scenes, robots and meshes"),
+}
+
+_HELP = f"""\
+usage: env2mjcf VERB ...
+
+Motion-planning environments (.env scenes, BYU meshes, DH robots) in MuJoCo.
+
+verbs:
+{"".join(f"  {verb:9} {summary}{chr(10)}" for verb, (_, _, summary) in VERBS.items())}
+examples:
+  env2mjcf info scene.env                         what is in it
+  env2mjcf convert scene.env out/                 out/scene.xml, for MuJoCo
+  env2mjcf check scene.env --query scene.query    are start and goal free
+  env2mjcf lint scenes/                           what is doubtful in a folder
+  env2mjcf convert --help                         all options of a verb
+
+exit status: 0 done, free or valid; 1 a finding (collision, invalid configuration, lint error); 2 wrong usage;
+3 bad input; 4 a fault of env2mjcf. Results go to stdout, everything else to stderr.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit status.
+
+    Args:
+        arguments: What stands behind the program's name; None takes it from `sys.argv`.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A name that the terminal's encoding lacks is no reason to fail.
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        status = _dispatch(words)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _abandon_stdout()
+        return _BROKEN_PIPE
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    return status
+
+
+def _dispatch(words: list[str]) -> int:
+    name = words[0] if words else ""
+    if name in ("-h", "--help"):
+        print(_HELP, end="")
+        return DONE
+    if name == "--version":
+        from .. import __version__
+
+        print(__version__)
+        return DONE
+    if name not in VERBS:
+        guess = did_you_mean(name, VERBS)
+        what = f"there is no verb {name!r}{f'; {guess}' if guess else ''}" if name else "a verb is missing"
+        _complain(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
+        return WRONG_USAGE
+    module, class_name, _ = VERBS[name]
+    try:
+        verb = parse(getattr(import_module(f".{module}", __package__), class_name), name, words[1:])
+    except SystemExit as ended:  # tyro has printed its help, or what is wrong
+        return ended.code if isinstance(ended.code, int) else WRONG_USAGE
+    return _run(name, verb)
+
+
+def _run(name: str, verb: Verb) -> int:
+    debug = verb.output.debug or os.environ.get("ENV2MJCF_DEBUG") == "1"
+    try:
+        return verb.run()
+    except BrokenPipeError:
+        raise
+    except Env2MjcfError as error:
+        print_diagnostics(error.diagnostics, verb.output.verbose)
+        if verb.output.json:
+            print_json({"error": error.diagnostic, "diagnostics": error.diagnostics})
+        status = BAD_INPUT
+    except (ValueError, NotImplementedError) as error:
+        _complain(f"{name}: {error}")
+        status = WRONG_USAGE
+    except Exception as error:
+        notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
+        _complain(f"{name}: a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes}")
+        if not debug:
+            _complain("--debug shows where it happened")
+        status = FAULT
+    if debug:
+        traceback.print_exc()
+    return status
+
+
+def _complain(message: str) -> None:
+    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
+
+
+def _abandon_stdout() -> None:
+    """Point stdout nowhere, so that nothing complains when the interpreter flushes it at the end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,95 @@
+"""Prints names, diagnostics and JSON, so that no file can play tricks on a terminal."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+import sys
+import unicodedata
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from ..errors import Diagnostic, Severity
+
+_COLOURS = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity.INFO: "bold cyan"}
+
+# Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.
+_TRICKY = ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
+def printable(text: str) -> str:
+    """Return text with control characters escaped; line feeds and tabs stay."""
+    return "".join(_escaped(c) if c not in "\n\t" and unicodedata.category(c) in _TRICKY else c for c in text)
+
+
+def one_line(text: str) -> str:
+    """Return text with every control character escaped."""
+    return "".join(_escaped(c) if unicodedata.category(c) in _TRICKY else c for c in text)
+
+
+def format_diagnostic(diagnostic: Diagnostic) -> str:
+    """Return a diagnostic as it is printed, with its source line and caret."""
+    span = diagnostic.span
+    if span is not None:
+        # One character stands for one, so that the caret stays under its column.
+        text = "".join("\ufffd" if c != "\t" and unicodedata.category(c) in _TRICKY else c for c in span.text)
+        span = dataclasses.replace(span, path=one_line(span.path), text=text)
+    safe = dataclasses.replace(
+        diagnostic, message=printable(diagnostic.message), hint=printable(diagnostic.hint), span=span
+    )
+    return str(safe)
+
+
+def stdout_console() -> Console:
+    """Return a console for results: in colour and as wide as the terminal, or plain and never folded."""
+    terminal = sys.stdout.isatty()
+    return Console(file=sys.stdout, highlight=False, markup=False, emoji=False, width=None if terminal else 10_000)
+
+
+def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
+    """Print diagnostics to stderr; those that are only worth knowing on request."""
+    console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    for diagnostic in diagnostics:
+        if verbose or diagnostic.severity is not Severity.INFO:
+            print_diagnostic(console, diagnostic)
+
+
+def print_diagnostic(console: Console, diagnostic: Diagnostic) -> None:
+    """Print one diagnostic, in colour where the console has colours."""
+    text = Text(format_diagnostic(diagnostic))
+    colour = _COLOURS[diagnostic.severity]
+    text.highlight_regex(rf"(?<![^ ]){diagnostic.severity} {re.escape(diagnostic.code)}:", colour)
+    text.highlight_regex(r"(?m)^[ \t]+\^+$", colour)
+    text.highlight_regex(r"(?m)^    hint:", "dim")
+    console.print(text, soft_wrap=True)
+
+
+def print_json(value: Any) -> None:
+    """Print a value to stdout as one JSON object."""
+    print(json.dumps(plain(value), indent=2, ensure_ascii=True, allow_nan=False))
+
+
+def plain(value: Any) -> Any:
+    """Return a value in terms of JSON; what is not finite, which JSON lacks, becomes null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(v) for v in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape").decode("ascii")
