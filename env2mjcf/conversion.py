@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,12 +119,15 @@ def _named_assets(xml: Path) -> set[str]:
 
 
 @contextmanager
-def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Iterator[None]:
+def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
     try:
         yield
     except (FileExistsError, NotADirectoryError) as error:
         log.fail(
-            ConversionError, "MJC421", str(folder), f"{error.filename or folder} is a file; expected a folder to write to"
+            ConversionError,
+            "MJC421",
+            str(folder),
+            f"{error.filename or folder} is a file; expected a folder to write to",
         )
     except PermissionError as error:
         log.fail(

@@ -95,7 +95,11 @@ class RobotKinematics:
             return start @ dh_matrix(self.multibody.dh_form, alpha, a, d, theta)
 
         if self.multibody.dh_form is DHForm.CRAIG:
-            return {DofKind.ALPHA: start, DofKind.THETA: after(alpha, dh.a, 0, 0), DofKind.D: after(alpha, dh.a, 0, theta)}
+            return {
+                DofKind.ALPHA: start,
+                DofKind.THETA: after(alpha, dh.a, 0, 0),
+                DofKind.D: after(alpha, dh.a, 0, theta),
+            }
         return {DofKind.THETA: start, DofKind.D: after(0, 0, 0, theta), DofKind.ALPHA: after(0, dh.a, d, theta)}
 
     def loop_gaps(self, q: ArrayLike, radii: Sequence[float]) -> Array:
@@ -185,7 +189,7 @@ class RobotKinematics:
 
     def _value(self, k: int, kind: DofKind, q: Array, default: float) -> Array:
         column = self._columns.get((k, kind))
-        return np.float64(default) if column is None else q[..., column]
+        return np.asarray(default) if column is None else q[..., column]
 
     def _arm(self, k: int, slide: Sequence[float]) -> float:
         """Length of the way from a connection's DH frame to the origin of its next body."""

@@ -19,8 +19,6 @@ DialectName = Literal["A", "B", "C", "D", "E"]
 PathArgument = str | PathLike[str]
 
 
-
-
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Bounds on hostile input. A file that passes one is refused with a diagnostic that names it.
@@ -108,9 +106,7 @@ class Options:
         for name in keywords:
             if name not in known:
                 guess = did_you_mean(name, known)
-                raise TypeError(
-                    f"unknown option {name!r}{f'; {guess}' if guess else ''} (options: {', '.join(known)})"
-                )
+                raise TypeError(f"unknown option {name!r}{f'; {guess}' if guess else ''} (options: {', '.join(known)})")
         values = dict(keywords)
         for name in ("robots", "mesh_dirs"):
             value = values.get(name, ())

@@ -13,7 +13,6 @@ from .kinematics import RobotKinematics
 from .model import BaseKind, JointType, MultiBody, PlannerRules
 from .options import Options
 
-
 ContactKind = Literal["obstacle", "self", "robot"]
 
 

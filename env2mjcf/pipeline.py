@@ -49,9 +49,7 @@ def compile_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> C
     return compile_assembly(environment, assembly, options, log)
 
 
-def compile_assembly(
-    environment: Environment, assembly: Assembly, options: Options, log: DiagnosticLog
-) -> Compiled:
+def compile_assembly(environment: Environment, assembly: Assembly, options: Options, log: DiagnosticLog) -> Compiled:
     """Take an assembled scene through the rest of the pipeline.
 
     Raises:
@@ -82,9 +80,7 @@ def configuration_space(assembly: Assembly, options: Options) -> ConfigurationSp
     )
     radius = max((r.radius for r in assembly.robots), default=0.0)
     if assembly.obstacles:
-        corners = np.concatenate(
-            [p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles]
-        )
+        corners = np.concatenate([p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles])
         space.set_sample_box(corners.min(axis=0) - radius, corners.max(axis=0) + radius)
     else:
         space.set_sample_box(np.full(3, -2 * radius), np.full(3, 2 * radius))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,7 +57,7 @@ class ConfigurationSpace:
     ) -> None:
         self.names = tuple(names)
         stops = np.cumsum([0, *(r.dim for r in robots)])
-        self.robot_slices = tuple(slice(int(a), int(b)) for a, b in zip(stops[:-1], stops[1:], strict=True))
+        self.robot_slices = tuple(slice(int(a), int(b)) for a, b in pairwise(stops))
         dofs = [d for r in robots for d in r.dofs]
         self.lower = np.array([d.lower for d in dofs], dtype=np.float64)
         self.upper = np.array([d.upper for d in dofs], dtype=np.float64)
@@ -248,9 +249,7 @@ def joint_kinds(robot: RobotKinematics, connection: int) -> tuple[DofKind, ...]:
     return (kinds[joint],) if joint in kinds else ()
 
 
-def _layout(
-    robots: Sequence[RobotKinematics], slices: Sequence[slice]
-) -> tuple[tuple[tuple[Slot, ...], ...], int]:
+def _layout(robots: Sequence[RobotKinematics], slices: Sequence[slice]) -> tuple[tuple[tuple[Slot, ...], ...], int]:
     """Lay the joints out in qpos: robots in order, bodies depth first."""
     layout: list[tuple[Slot, ...]] = []
     address = 0

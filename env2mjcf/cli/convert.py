@@ -13,7 +13,7 @@ from tyro.conf import Positional
 
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json
+from .printing import one_line, print_diagnostics, print_json, working
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,8 @@ class Convert:
         if self.out is not None and self.output_path is not None:
             raise ValueError(f"the output is given twice, as {self.out!r} and as --out {self.output_path!r}")
         target = self.out or self.output_path or f"{Path(self.scene).stem}_mjcf"
-        result = convert(self.scene, target, **keywords(self.options))
+        with working(f"converting {self.scene}"):
+            result = convert(self.scene, target, **keywords(self.options))
         print_diagnostics(result.diagnostics, self.output.verbose)
         if self.output.json:
             print_json(

@@ -90,28 +90,32 @@ def _dispatch(words: list[str]) -> int:
 
 
 def _run(name: str, verb: Verb) -> int:
-    debug = verb.output.debug or os.environ.get("ENV2MJCF_DEBUG") == "1"
     try:
         return verb.run()
     except BrokenPipeError:
         raise
-    except Env2MjcfError as error:
+    except Exception as error:
+        if verb.output.debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
+            traceback.print_exc()
+        return _explain(name, verb, error)
+
+
+def _explain(name: str, verb: Verb, error: Exception) -> int:
+    """Say what went wrong, and return the exit status for it."""
+    if isinstance(error, Env2MjcfError):
         print_diagnostics(error.diagnostics, verb.output.verbose)
         if verb.output.json:
             print_json({"error": error.diagnostic, "diagnostics": error.diagnostics})
-        status = BAD_INPUT
-    except (ValueError, NotImplementedError) as error:
+        return BAD_INPUT
+    if isinstance(error, ValueError | NotImplementedError):
         _complain(f"{name}: {error}")
-        status = WRONG_USAGE
-    except Exception as error:
-        notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
-        _complain(f"{name}: a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes}")
-        if not debug:
-            _complain("--debug shows where it happened")
-        status = FAULT
-    if debug:
-        traceback.print_exc()
-    return status
+        return WRONG_USAGE
+    notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
+    _complain(
+        f"{name}: a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} "
+        "(--debug shows where it happened)"
+    )
+    return FAULT
 
 
 def _complain(message: str) -> None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import math
 import re
 import sys
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.text import Text
 
 from ..errors import Diagnostic, Severity
@@ -47,10 +49,29 @@ def format_diagnostic(diagnostic: Diagnostic) -> str:
     return str(safe)
 
 
-def stdout_console() -> Console:
-    """Return a console for results: in colour and as wide as the terminal, or plain and never folded."""
-    terminal = sys.stdout.isatty()
-    return Console(file=sys.stdout, highlight=False, markup=False, emoji=False, width=None if terminal else 10_000)
+def print_parts(parts: Iterable[RenderableType]) -> None:
+    """Print results: in colour and as wide as the terminal, or plain, never folded and without trailing blanks."""
+    if sys.stdout.isatty():
+        console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
+        for part in parts:
+            console.print(part)
+        return
+    console = Console(file=io.StringIO(), highlight=False, markup=False, emoji=False, width=10_000, color_system=None)
+    with console.capture() as capture:
+        for part in parts:
+            console.print(part)
+    print("\n".join(line.rstrip() for line in capture.get().splitlines()))
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Say on a terminal that something is being done, for as long as it takes."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False)
+    with console.status(Text(one_line(what), "dim")):
+        yield
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
@@ -61,9 +82,16 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) 
             print_diagnostic(console, diagnostic)
 
 
-def print_diagnostic(console: Console, diagnostic: Diagnostic) -> None:
-    """Print one diagnostic, in colour where the console has colours."""
-    text = Text(format_diagnostic(diagnostic))
+def print_diagnostic(console: Console, diagnostic: Diagnostic, path: str = "") -> None:
+    """Print one diagnostic, in colour where the console has colours.
+
+    Args:
+        console: Where to.
+        diagnostic: What to print.
+        path: The file to name where the diagnostic has no place of its own.
+    """
+    place = f"{one_line(path)}: " if path and diagnostic.span is None else ""
+    text = Text(place + format_diagnostic(diagnostic))
     colour = _COLOURS[diagnostic.severity]
     text.highlight_regex(rf"(?<![^ ]){diagnostic.severity} {re.escape(diagnostic.code)}:", colour)
     text.highlight_regex(r"(?m)^[ \t]+\^+$", colour)

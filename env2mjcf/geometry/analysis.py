@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
+from .cleaning import cleaned
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
-from .orientation import face_volumes, inside_out
-from .topology import RELATIVE_TOLERANCE, Bools, Edges, Floats, Ints, edges, face_components, weld
+from .orientation import inside_out, rewound, wound_alike
+from .topology import RELATIVE_TOLERANCE, Floats, Ints, edges, face_areas, face_components, face_volumes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,8 +20,8 @@ class Analysis:
 
     Attributes:
         vertices: (n, 3) read-only; the file's vertices after welding, only those that `faces` use.
-        faces: (m, 3) read-only; without degenerate and duplicate ones, and of a closed, consistently wound mesh all
-            counter-clockwise from outside.
+        faces: (m, 3) read-only; without degenerate and duplicate ones, and of a `solid` mesh all counter-clockwise
+            from outside.
         source: (m,) row of each face in the mesh's own face list.
         component: (m,) component of each face.
         component_volumes: (c,) signed volumes of the components, wound as in `faces`; negative: a cavity.
@@ -28,12 +29,13 @@ class Analysis:
         dimension: Of the point set within the tolerance: 0 a point, 1 a line, 2 flat, 3.
         normal: (3,) unit normal of the plane that the points are nearest to.
         closed: Each edge borders an even number of triangles, and the surface is not flat.
-        consistent: Each edge is walked equally often both ways, as far as it has two faces.
+        consistent: In the file each edge is walked equally often both ways, as far as it has two faces.
+        oriented: The same for `faces`: those of a closed mesh are turned round to agree, where that is possible.
         inverted: Closed and consistent, and wound inside out in the file, at least in part.
         convex: Closed, one component, and the boundary of its own hull.
         box: The box that it is, if it is convex and exactly that.
         area: Of `faces`.
-        signed_volume: Of the faces as they are wound in the file; without meaning unless closed and consistent.
+        signed_volume: As wound in the file, if that is consistent; without meaning unless the mesh is closed.
         degenerate_faces: Faces of no height that were dropped.
         duplicate_faces: Copies of other faces that were dropped.
         unused_vertices: Vertices of the file that no face uses.
@@ -51,6 +53,7 @@ class Analysis:
     normal: Floats
     closed: bool
     consistent: bool
+    oriented: bool
     inverted: bool
     convex: bool
     box: Box | None
@@ -74,8 +77,8 @@ class Analysis:
 
     @property
     def solid(self) -> bool:
-        """Closed and consistently wound, so that `faces` tells inside from outside."""
-        return self.closed and self.consistent
+        """Closed, and wound so that `faces` tells inside from outside."""
+        return self.closed and self.oriented
 
     @property
     def volume(self) -> float:
@@ -95,21 +98,16 @@ def analyse(mesh: Mesh) -> Analysis:
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     tolerance = RELATIVE_TOLERANCE * diagonal
     dimension, normal = _dimension(points, tolerance)
-    welded = np.searchsorted(used, mesh.faces)
-    welded = weld(points, tolerance)[welded].reshape(-1, 3)
-
-    whole = (welded != np.roll(welded, 1, axis=1)).all(axis=1)
-    high = _heights(points, welded) > tolerance
-    one, both = _without_copies(welded)
-    keep, table, closed = _choose(points, welded, (one & whole, both & whole), high, dimension)
-    kept = np.flatnonzero(keep & high)
-    faces = welded[kept]
-    consistent = bool((np.abs(table.balance) <= table.faces % 2).all())
+    clean = cleaned(points, np.searchsorted(used, mesh.faces), tolerance, dimension)
+    faces, table = clean.faces, clean.edges
+    consistent = oriented = wound_alike(table)
+    if clean.closed and not consistent:
+        faces, oriented = rewound(faces)
 
     component = face_components(edges(faces))
-    volumes = np.bincount(component, face_volumes(points, faces) / 6.0) if len(faces) else np.zeros(0)
+    volumes = np.bincount(component, face_volumes(points, faces) / 6.0).astype(np.float64)
     signed_volume = float(volumes.sum())
-    if closed and consistent:
+    if clean.closed and oriented:
         flipped = inside_out(points, faces, component, volumes)
     else:
         flipped = np.zeros(len(volumes), dtype=np.bool_)
@@ -117,27 +115,28 @@ def analyse(mesh: Mesh) -> Analysis:
     volumes = np.where(flipped, -volumes, volumes)
     left, faces = np.unique(faces, return_inverse=True)
     vertices, faces = points[left], faces.reshape(-1, 3).astype(np.int64)
-    convex = closed and len(volumes) == 1 and is_convex(vertices, faces, tolerance)
-    for array in (vertices, faces, kept, component, volumes, normal):
+    convex = clean.closed and len(volumes) == 1 and is_convex(vertices, faces, tolerance)
+    for array in (vertices, faces, clean.source, component, volumes, normal):
         array.setflags(write=False)
     return Analysis(
         vertices=vertices,
         faces=faces,
-        source=kept,
+        source=clean.source,
         component=component,
         component_volumes=volumes,
         diagonal=diagonal,
         dimension=dimension if len(faces) else min(dimension, 1),
         normal=normal,
-        closed=closed,
+        closed=clean.closed,
         consistent=consistent,
-        inverted=bool(flipped.any()),
+        oriented=oriented,
+        inverted=consistent and bool(flipped.any()),
         convex=convex,
         box=exact_box(vertices, faces, tolerance) if convex else None,
-        area=float(_areas(vertices, faces).sum()),
+        area=float(face_areas(vertices, faces).sum()),
         signed_volume=signed_volume,
-        degenerate_faces=int((~whole | (one & ~high)).sum()),
-        duplicate_faces=int((whole & ~keep).sum()),
+        degenerate_faces=clean.degenerate,
+        duplicate_faces=clean.duplicates,
         unused_vertices=len(mesh.vertices) - len(used),
         open_edges=int((table.faces % 2 == 1).sum()),
         crowded_edges=int((table.faces > 2).sum()),
@@ -155,57 +154,6 @@ def _dimension(points: Floats, tolerance: float) -> tuple[int, Floats]:
     return int(spread.sum()), np.asarray(normal + 0.0, dtype=np.float64)
 
 
-def _areas(points: Floats, faces: Ints) -> Floats:
-    corners = points[faces]
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-
-
-def _heights(points: Floats, faces: Ints) -> Floats:
-    """Return the smallest height of each face, (m,)."""
-    corners = points[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    return np.divide(2 * _areas(points, faces), longest, out=np.zeros(len(faces)), where=longest > 0)
-
-
-def _without_copies(faces: Ints) -> tuple[Bools, Bools]:
-    """Return two masks (m,): one copy of each triangle, and one copy of each triangle and winding."""
-    corner = np.argsort(faces, axis=1)
-    turned = (np.diff(corner, axis=1) % 3 == 1).all(axis=1)
-    keys = np.sort(faces, axis=1)
-    one, both = np.zeros((2, len(faces)), dtype=np.bool_)
-    if len(faces):
-        one[np.unique(keys, axis=0, return_index=True)[1]] = True
-        both[np.unique(np.column_stack([keys, turned]), axis=0, return_index=True)[1]] = True
-    return one, both
-
-
-def _choose(
-    points: Floats, faces: Ints, masks: tuple[Bools, Bools], high: Bools, dimension: int
-) -> tuple[Bools, Edges, bool]:
-    """Pick the face set that closes the surface: which copies count, and whether faces of no height do.
-
-    A wall that two solids share is a pair of opposite copies: both must stay for its edges to be even (their
-    volumes cancel). A face of no height may bridge a T-junction: then it counts for the topology, though not as area.
-    """
-    one, both = masks
-    fallback: tuple[Bools, Edges] | None = None
-    for mask in (one, both) if (one != both).any() else (one,):
-        for counted in (mask & high, mask) if (mask & ~high).any() else (mask,):
-            table = edges(faces[counted])
-            fallback = fallback or (mask, table)
-            if dimension < 3 or not counted.any() or (table.faces % 2).any():
-                continue
-            if mask is both and abs(face_volumes(points, faces[counted]).sum()) <= _noise(points, faces[counted]):
-                continue  # a sheet with two sides encloses nothing
-            return mask, table, True
-    assert fallback is not None
-    return *fallback, False
-
-
-def _noise(points: Floats, faces: Ints) -> float:
-    return 1e-9 * float(_areas(points, faces).sum() * np.linalg.norm(np.ptp(points, axis=0)))
-
-
 def mesh_diagnostics(
     mesh: Mesh, analysis: Analysis, log: DiagnosticLog, subject: str = "", span: Span | None = None
 ) -> None:
@@ -218,6 +166,9 @@ def mesh_diagnostics(
 
     def warn(code: str, message: str, hint: str = "") -> None:
         log.warn(GeometryError, code, subject, message, hint=hint, span=span)
+
+    def note(code: str, message: str) -> None:
+        log.info(code, subject, message, span=span)  # noqa: PLE1205 -- no logger of the standard library
 
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject, span)
@@ -234,15 +185,16 @@ def mesh_diagnostics(
             "it collides as a sheet: a body wholly inside it does not count as touching",
         )
     if not analysis.consistent:
-        warn("GEO234", "neighbouring faces are wound opposite ways, so no side is outside", "make the winding agree")
+        done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
+        warn("GEO234", f"neighbouring faces are wound opposite ways; {done}")
     elif analysis.inverted:
         warn("GEO233", f"wound inside out (volume {analysis.signed_volume:.6g}); the faces were turned round")
     if analysis.crowded_edges:
-        log.info("GEO239", subject, f"{analysis.crowded_edges} edges have more than two faces", span=span)
+        note("GEO239", f"{analysis.crowded_edges} edges have more than two faces")
     if analysis.components > 1:
-        log.info("GEO237", subject, f"the mesh is in {analysis.components} pieces", span=span)
+        note("GEO237", f"the mesh is in {analysis.components} pieces")
     if analysis.unused_vertices:
-        log.info("GEO238", subject, f"{analysis.unused_vertices} vertices are used by no face", span=span)
+        note("GEO238", f"{analysis.unused_vertices} vertices are used by no face")
 
 
 def refuse_without_area(analysis: Analysis, log: DiagnosticLog, subject: str, span: Span | None = None) -> None:

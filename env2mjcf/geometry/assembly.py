@@ -211,7 +211,8 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
             if connection.joint is JointType.SMA:
                 log.fail(
                     ConversionError, "KIN320", "SMAJoint",
-                    "an SMAJoint bends along its length, which no MuJoCo joint does; the scene reads, but does not convert",
+                    "an SMAJoint bends along its length, which no MuJoCo joint does: "
+                    "the scene reads, but does not convert",
                     hint="replace it by Revolute joints", span=connection.span,
                 )  # fmt: skip
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .topology import Edges, Floats, Ints, edges
+from .topology import Floats, Ints, edges
 
 _BLOCK = 4_000_000  # distances held in memory at once
 
@@ -26,7 +26,7 @@ class Box:
     rotation: Floats
 
 
-def is_convex(vertices: Floats, faces: Ints, tolerance: float, table: Edges | None = None) -> bool:
+def is_convex(vertices: Floats, faces: Ints, tolerance: float) -> bool:
     """Tell whether every vertex lies within `tolerance` behind the plane of every face.
 
     The surface must be closed; its winding does not matter, because the mean of its vertices is inside a convex one.
@@ -35,14 +35,12 @@ def is_convex(vertices: Floats, faces: Ints, tolerance: float, table: Edges | No
         vertices: (n, 3), all used by `faces`.
         faces: (m, 3) without degenerate ones.
         tolerance: Length.
-        table: Edges of `faces`, if they are at hand.
     """
     if len(faces) < 4:
         return False
     normals, offsets = _planes_from_mean(vertices, faces)
-    return _edges_bulge(vertices, faces, normals, offsets, tolerance, table or edges(faces)) and _all_behind(
-        vertices, *_distinct(normals, offsets), tolerance
-    )
+    limits = offsets + tolerance
+    return _edges_bulge(vertices, faces, normals, limits) and _all_behind(vertices, *_distinct(normals, limits))
 
 
 def _planes_from_mean(vertices: Floats, faces: Ints) -> tuple[Floats, Floats]:
@@ -55,32 +53,31 @@ def _planes_from_mean(vertices: Floats, faces: Ints) -> tuple[Floats, Floats]:
     return normals, np.einsum("ij,ikj->ik", normals, corners).max(axis=1)
 
 
-def _edges_bulge(
-    vertices: Floats, faces: Ints, normals: Floats, offsets: Floats, tolerance: float, table: Edges
-) -> bool:
+def _edges_bulge(vertices: Floats, faces: Ints, normals: Floats, limits: Floats) -> bool:
     """Test each face against the neighbours only: linear in time, and most non-convex meshes end here."""
+    table = edges(faces)
     order = np.argsort(table.of_corner.ravel(), kind="stable")
     edge, corner = table.of_corner.ravel()[order], order
     linked = np.flatnonzero(edge[1:] == edge[:-1])
     for here, there in ((corner[linked], corner[linked + 1]), (corner[linked + 1], corner[linked])):
         face, opposite = here // 3, faces[there // 3, (there % 3 + 2) % 3]
-        if (np.einsum("ij,ij->i", normals[face], vertices[opposite]) > offsets[face] + tolerance).any():
+        if (np.einsum("ij,ij->i", normals[face], vertices[opposite]) > limits[face]).any():
             return False
     return True
 
 
-def _distinct(normals: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+def _distinct(normals: Floats, limits: Floats) -> tuple[Floats, Floats]:
     """Drop planes that are equal to the last bit, as those of a tessellated flat side often are."""
-    planes = np.unique(np.column_stack([normals, offsets]), axis=0)
+    planes = np.unique(np.column_stack([normals, limits]), axis=0)
     return planes[:, :3], planes[:, 3]
 
 
-def _all_behind(vertices: Floats, normals: Floats, offsets: Floats, tolerance: float) -> bool:
+def _all_behind(vertices: Floats, normals: Floats, limits: Floats) -> bool:
     """Test every vertex against every plane, down a tree of boxes: what lies wholly behind a plane is not opened."""
     boxes, leaves = _tree(vertices)
     step = max(1, _BLOCK // 256)
     for i in range(0, len(normals), step):
-        normal, limit = normals[i : i + step], offsets[i : i + step] + tolerance
+        normal, limit = normals[i : i + step], limits[i : i + step]
         plane, node = np.arange(len(normal)), np.zeros(len(normal), dtype=np.int64)
         for depth, (middle, half) in enumerate(boxes):
             if depth:

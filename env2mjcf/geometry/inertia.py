@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, hypot, sqrt
+from math import copysign, hypot
 
 import numpy as np
 
+from ..transforms import quaternion_from_matrix
 from .analysis import Analysis
 from .mesh import Mesh
 from .topology import RELATIVE_TOLERANCE, Floats
@@ -58,7 +59,7 @@ def inertial(mesh: Mesh, analysis: Analysis, density: float, mass: float | None 
     else:
         thickness = SHELL_THICKNESS * analysis.diagonal
         volume, com, second = _sheet(analysis.vertices[analysis.faces] - origin, thickness)
-        notes.append(f"{mesh.name} encloses no volume for certain: inertia of a sheet {thickness:.3g} thick")
+        notes.append(f"{mesh.name} encloses no certain volume, so it was taken for a sheet {thickness:.3g} thick")
     total = volume * density
     if mass is not None and mass > 0:
         total = float(mass)
@@ -76,7 +77,7 @@ def inertial(mesh: Mesh, analysis: Analysis, density: float, mass: float | None 
         notes.append(f"moments raised to what MuJoCo takes (second moments of at least {least:.3g})")
         spread = np.maximum(spread, least)
     diagonal = spread.sum() - spread
-    quat, com = _quaternion(axes), com + origin
+    quat, com = quaternion_from_matrix(axes) + 0.0, com + origin
     for array in (diagonal, quat, com):
         array.setflags(write=False)
     return Inertial(total, com, quat, diagonal, "; ".join(notes))
@@ -146,24 +147,3 @@ def principal_axes(matrix: Floats) -> tuple[Floats, Floats]:
             [s * x + c * y for x, y in zip(a[p], a[q], strict=True)],
         )
     return np.array([a[i][i] for i in range(3)]), np.array(v)
-
-
-def _quaternion(rotation: Floats) -> Floats:
-    """Return the unit quaternion w x y z of a rotation, with the first nonzero of w, x, y, z positive."""
-    r: list[list[float]] = rotation.tolist()
-    trace = r[0][0] + r[1][1] + r[2][2]
-    # Shepperd's choice (J. Guidance and Control 1(3), 1978): divide by the largest of the four.
-    diagonal = [trace, r[0][0], r[1][1], r[2][2]]
-    k = max(range(4), key=lambda i: diagonal[i])
-    if k == 0:
-        q = [1 + trace, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]
-    else:
-        i, j, l = k - 1, k % 3, (k + 1) % 3
-        q = [0.0, 0.0, 0.0, 0.0]
-        q[0] = r[l][j] - r[j][l]
-        q[1 + i] = 1 + 2 * r[i][i] - trace
-        q[1 + j] = r[j][i] + r[i][j]
-        q[1 + l] = r[l][i] + r[i][l]
-    size = sqrt(sum(x * x for x in q))
-    first = next(x for x in q if abs(x) > 1e-12 * size)
-    return np.array([x / copysign(size, first) + 0.0 for x in q])

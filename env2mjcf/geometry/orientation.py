@@ -4,15 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from .topology import Bools, Floats, Ints
+from .topology import Bools, Edges, Floats, Ints, connected, edges
 
 _BLOCK = 2_000_000  # solid angles held in memory at once
 
 
-def face_volumes(vertices: Floats, faces: Ints) -> Floats:
-    """Return six times the signed volume of the tetrahedron from the vertices' mean to each face, (m,)."""
-    corners = vertices[faces] - vertices.mean(axis=0)
-    return np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+def wound_alike(table: Edges) -> bool:
+    """Tell whether each edge is walked as often one way as the other, but for the odd face at an open edge."""
+    return bool((np.abs(table.balance) <= table.faces % 2).all())
+
+
+def rewound(faces: Ints) -> tuple[Ints, bool]:
+    """Turn faces round until neighbours agree; in each patch the winding of the majority wins.
+
+    Returns:
+        The faces and True, or the faces as they were and False where no winding makes all edges agree.
+    """
+    table = edges(faces)
+    order = np.argsort(table.of_corner.ravel(), kind="stable")
+    edge = table.of_corner.ravel()[order]
+    pair = np.flatnonzero((edge[1:] == edge[:-1]) & (table.faces == 2)[edge[:-1]])
+    a, b, differ = order[pair] // 3, order[pair + 1] // 3, table.balance[edge[pair]] != 0
+    a, b, differ = np.concatenate([a, b]), np.concatenate([b, a]), np.concatenate([differ, differ])
+    patch = connected(len(faces), a, b)
+    turned, known = np.zeros((2, len(faces)), dtype=np.bool_)
+    known[np.unique(patch, return_index=True)[1]] = True
+    while (step := known[a] & ~known[b]).any():
+        turned[b[step]] = turned[a[step]] ^ differ[step]
+        known[b[step]] = True
+    minority = np.bincount(patch, turned) * 2 <= np.bincount(patch)
+    out = np.where((turned == minority[patch])[:, None], faces[:, ::-1], faces)
+    return (out, True) if wound_alike(edges(out)) else (faces, False)
 
 
 def winding_numbers(points: Floats, vertices: Floats, faces: Ints) -> Floats:

@@ -42,7 +42,7 @@ class CollisionShape:
     note: str
 
 
-def collision_shape(
+def collision_shape(  # noqa: PLR0917
     mesh: Mesh,
     analysis: Analysis,
     strategy: Collision,
@@ -78,7 +78,7 @@ def collision_shape(
     shape = _STRATEGIES[strategy](mesh, analysis, thickness)
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
-        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
+        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)  # noqa: PLE1205
     return shape
 
 
@@ -126,9 +126,7 @@ def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
     if len(rest) == 0:
         return CollisionShape(mesh, "hull", hulls, False, analysis, hulled)
     pieces, note = _prisms(analysis, rest, thickness)
-    return CollisionShape(
-        mesh, "surface", hulls + pieces, True, analysis, f"{hulled}, {note}" if hulls else note
-    )
+    return CollisionShape(mesh, "surface", hulls + pieces, True, analysis, f"{hulled}, {note}" if hulls else note)
 
 
 def _convex_solids(analysis: Analysis) -> Bools:

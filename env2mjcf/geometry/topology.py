@@ -111,3 +111,15 @@ def _near(points: Floats, tolerance: float) -> Ints:
     if not links:
         return np.arange(len(points), dtype=np.int64)
     return connected(len(points), np.concatenate([x[0] for x in links]), np.concatenate([x[1] for x in links]))
+
+
+def face_areas(vertices: Floats, faces: Ints) -> Floats:
+    """Return the area of each face, (m,)."""
+    corners = vertices[faces]
+    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+
+
+def face_volumes(vertices: Floats, faces: Ints) -> Floats:
+    """Return six times the signed volume of the tetrahedron from the vertices' mean to each face, (m,)."""
+    corners = vertices[faces] - (vertices.mean(axis=0) if len(vertices) else 0.0)
+    return np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))

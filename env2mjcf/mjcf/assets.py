@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import trimesh
 from lxml import etree
+from trimesh.exchange.obj import export_obj
+from trimesh.exchange.stl import export_stl
 
 from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
@@ -86,9 +88,8 @@ def _visual_file(mesh: Mesh) -> tuple[bytes, str]:
     vertices, faces = _drawable(mesh)
     drawn = trimesh.Trimesh(vertices, faces, process=False)
     if len(faces) > _MAX_STL_FACES:
-        text = drawn.export(file_type="obj", include_normals=False, include_color=False, header=None, digits=9)
-        return str(text).encode("ascii"), "obj"
-    return bytes(drawn.export(file_type="stl")), "stl"
+        return export_obj(drawn, include_normals=False, include_color=False, header=None, digits=9).encode(), "obj"
+    return export_stl(drawn), "stl"
 
 
 def _drawable(mesh: Mesh) -> tuple[Array, np.ndarray]:

@@ -62,7 +62,9 @@ def compile_mjcf(
         add_actuators(root, compilation, log)
     add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
-    return Document(environment.name, f"{_header(assembly, options)}\n{text}", compilation.assets.files, compilation.owners)
+    return Document(
+        environment.name, f"{_header(assembly, options)}\n{text}", compilation.assets.files, compilation.owners
+    )
 
 
 def _header(assembly: Assembly, options: Options) -> str:

@@ -259,7 +259,8 @@ class Scene:
         """Return whether anything touches on the straight way between two configurations, ends included.
 
         Args:
-            q0, q1: (dim,) or (n, dim).
+            q0: Where the edges begin, (dim,) or (n, dim).
+            q1: Where they end, of the same shape.
             resolution: Greatest distance in metres that any point of a robot moves between two checks; None takes
                 the file's PositionRes, else 0.01 extent.
 
@@ -280,7 +281,8 @@ class Scene:
         Raises:
             NotImplementedError: Always.
         """
-        self.space.check(q0), self.space.check(q1)
+        self.space.check(q0)
+        self.space.check(q1)
         raise NotImplementedError("edge_is_free() is not available yet; edge_in_collision() checks in steps")
 
     def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:

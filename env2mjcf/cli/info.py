@@ -1,0 +1,90 @@
+"""`env2mjcf info`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.console import RenderableType
+from tyro.conf import Positional
+
+from ..errors import DiagnosticLog, Env2MjcfError
+from ..options import Options
+from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .printing import plain, print_diagnostics, print_json, print_parts, working
+from .tables import geometry_part, pairs_part, text_part
+
+if TYPE_CHECKING:
+    from ..simulation.scene import Scene
+    from .describing import SceneSummary
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """Say what a scene holds and how it is read: dialect, robots, degrees of freedom, obstacles, meshes.
+
+    examples:
+      env2mjcf info serial.env
+      env2mjcf info box.env --robots box.robot --query box.query
+      env2mjcf info problem.xml --pairs
+      env2mjcf info serial.env --json | jq '.robots[0].dofs[].name'
+
+    Attributes:
+        scene: An env file, an XML environment or a problem XML.
+        pairs: List every pair of bodies that is tested.
+        output: How to report.
+        options: What may be chosen.
+    """
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
+    pairs: bool = False
+    output: OutputFlags = field(default_factory=Output)
+    options: OptionFlags = field(default_factory=Options)
+
+    def run(self) -> int:
+        """Print what the text says, then what meshes and MuJoCo add to it."""
+        from ..formats.reading import read_scene
+        from .describing import describe
+
+        chosen = Options.from_keywords(keywords(self.options))
+        environment = read_scene(self.scene, chosen, DiagnosticLog(chosen.strict))
+        summary = describe(environment, keywords(chosen))
+        scene, error = self._load(chosen)
+        diagnostics = error.diagnostics if error or not scene else scene.diagnostics
+        if self.output.json:
+            facts: dict[str, Any] = self._facts(summary, scene)
+            if error:
+                facts["error"] = plain(error.diagnostic)
+            print_json({**facts, "diagnostics": diagnostics})
+        else:
+            print_parts(self._parts(summary, scene))
+        # Findings that are only worth knowing are part of what was asked for.
+        print_diagnostics(diagnostics, verbose=not self.output.json or self.output.verbose)
+        return 3 if error else 0
+
+    def _load(self, options: Options) -> tuple[Scene | None, Env2MjcfError | None]:
+        from ..simulation.preparing import prepare
+
+        try:
+            with working(f"loading {self.scene}"):
+                return prepare(self.scene, options, DiagnosticLog(options.strict)), None
+        except Env2MjcfError as error:
+            return None, error
+
+    def _facts(self, summary: SceneSummary, scene: Scene | None) -> dict[str, Any]:
+        facts: dict[str, Any] = plain(summary)
+        if scene is not None:
+            report = dataclasses.asdict(scene.report)
+            facts |= {k: report[k] for k in ("collision", "geoms", "mass", "extent", "meshes")}
+            facts["pairs"] = scene.pairs if self.pairs else len(scene.pairs)
+        return facts
+
+    def _parts(self, summary: SceneSummary, scene: Scene | None) -> Iterator[RenderableType]:
+        yield from text_part(summary)
+        if scene is not None:
+            yield from geometry_part(scene.report)
+            if self.pairs:
+                yield from pairs_part(scene.pairs)

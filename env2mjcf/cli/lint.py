@@ -1,0 +1,111 @@
+"""`env2mjcf lint`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from rich.console import Console
+from tyro.conf import Positional
+
+from ..errors import Diagnostic, Severity
+from ..options import Options
+from .arguments import OptionFlags, Output, OutputFlags
+from .printing import one_line, print_diagnostic, print_json, printable
+
+if TYPE_CHECKING:
+    from ..linting import LintResult
+
+_GITHUB_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
+
+
+@dataclass(frozen=True, slots=True)
+class Lint:
+    """List everything doubtful in scenes, their robots and meshes, and what touches at home.
+
+    Folders are searched for .env, .robot and .xml files. An error in one file does not keep the others from being
+    looked at. The exit status is 1 if there is an error; with --strict also if there is a warning.
+
+    examples:
+      env2mjcf lint scenes/
+      env2mjcf lint a.env b.env part.g --strict
+      env2mjcf lint scenes/ --github                  annotations for GitHub Actions
+      env2mjcf lint scenes/ --json | jq .errors
+
+    Attributes:
+        paths: Folders, scenes, robot files or meshes.
+        github: Print GitHub annotations.
+        output: How to report.
+        options: What may be chosen.
+    """
+
+    paths: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH [PATH ...]"), Positional]
+    github: bool = False
+    output: OutputFlags = field(default_factory=Output)
+    options: OptionFlags = field(default_factory=Options)
+
+    def run(self) -> int:
+        """Print all findings and a summary; 1 if there is an error, or in strict mode a warning."""
+        from ..linting import lint
+
+        if not self.paths:
+            raise ValueError("a path is missing; expected folders, scenes, robot files or meshes")
+        if self.github and self.output.json:
+            raise ValueError("--json and --github exclude each other")
+        results = lint(self.paths, self.options, progress=True)
+        errors, warnings, notes = (sum(r.count(s) for r in results) for s in reversed(Severity))
+        summary = f"{_some(len(results), 'file')}: {_some(errors, 'error')}, {_some(warnings, 'warning')}, " + _some(
+            notes, "note"
+        )
+        if self.output.json:
+            print_json({"errors": errors, "warnings": warnings, "notes": notes, "files": results})
+        elif self.github:
+            for result in results:
+                for diagnostic in result.diagnostics:
+                    print(github_annotation(diagnostic, result.path))
+            print(summary, file=sys.stderr)
+        else:
+            _print_text(results)
+            print(summary)
+        if not results:
+            print("env2mjcf: lint: no scene, robot or mesh was found", file=sys.stderr)
+        return 1 if errors or (self.options.strict and warnings) else 0
+
+
+def github_annotation(diagnostic: Diagnostic, path: str) -> str:
+    """Return the workflow command that makes GitHub show a diagnostic beside its line.
+
+    Args:
+        diagnostic: What was found.
+        path: The file to show it at where it has no place of its own.
+    """
+    span = diagnostic.span
+    properties = {"file": span.path if span else path}
+    if span:
+        properties |= {"line": str(span.line), "col": str(span.column), "endColumn": str(span.column + span.length)}
+    properties["title"] = f"env2mjcf {diagnostic.code}"
+    listed = ",".join(f"{k}={_github_property(v)}" for k, v in properties.items())
+    message = diagnostic.message + (f"\nhint: {diagnostic.hint}" if diagnostic.hint else "")
+    return f"::{_GITHUB_LEVELS[diagnostic.severity]} {listed}::{_github_text(printable(message))}"
+
+
+def _github_text(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _github_property(text: str) -> str:
+    return _github_text(one_line(text)).replace(":", "%3A").replace(",", "%2C")
+
+
+def _print_text(results: Sequence[LintResult]) -> None:
+    console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    for result in results:
+        for diagnostic in result.diagnostics:
+            print_diagnostic(console, diagnostic, result.path)
+
+
+def _some(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,104 @@
+"""Says of each configuration not only whether it is valid, but what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..contact.boundary import BoundaryTest
+from ..contact.types import Contact
+from ..simulation.scene import Scene
+from ..transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenLimit:
+    """A degree of freedom beyond its limits, in radians or metres."""
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What is known of one configuration.
+
+    Attributes:
+        label: What it is called.
+        q: (dim,) radians and metres.
+        valid: Whether nothing is wrong with it.
+        in_collision: Whether anything touches.
+        limits: Degrees of freedom beyond their limits.
+        outside: Links that reach beyond the boundary.
+        contacts: The deepest contact of each pair that touches.
+    """
+
+    label: str
+    q: Array
+    valid: bool
+    in_collision: bool
+    limits: tuple[BrokenLimit, ...] = ()
+    outside: tuple[str, ...] = ()
+    contacts: tuple[Contact, ...] = field(default=())
+
+
+class Judge:
+    """Judges configurations of a scene.
+
+    Args:
+        scene: The scene.
+        q: (n, dim) configurations.
+        labels: What each is called.
+    """
+
+    def __init__(self, scene: Scene, q: Array, labels: Sequence[str]) -> None:
+        self._scene, self._q, self._labels = scene, q, labels
+        assembly = scene.compiled.assembly
+        links = [p for r in assembly.robots for p in r.links]
+        self._boundaries = [(p.name, BoundaryTest(assembly.environment.boundary, [p])) for p in links]
+        self.in_limits = scene.space.within_limits(q)
+        self.in_collision = scene.in_collision(q, progress=True)
+        self.inside = BoundaryTest(assembly.environment.boundary, links).inside(scene.link_poses(q))
+        self.valid = self.in_limits & self.inside & ~self.in_collision
+
+    def verdict(self, index: int) -> Verdict:
+        """Return all that is wrong with one configuration."""
+        scene, q = self._scene, self._q[index]
+        collides = bool(self.in_collision[index])
+        return Verdict(
+            self._labels[index],
+            q,
+            bool(self.valid[index]),
+            collides,
+            () if self.in_limits[index] else self._broken_limits(q),
+            () if self.inside[index] else self._outside(q),
+            _deepest(scene.contacts(q)) if collides else (),
+        )
+
+    def _broken_limits(self, q: Array) -> tuple[BrokenLimit, ...]:
+        space = self._scene.space
+        beyond = ~space.periodic & ((q < space.lower) | (q > space.upper))
+        return tuple(
+            BrokenLimit(space.names[i], float(q[i]), float(space.lower[i]), float(space.upper[i]))
+            for i in np.flatnonzero(beyond)
+        )
+
+    def _outside(self, q: Array) -> tuple[str, ...]:
+        poses = self._scene.link_poses(q[None])
+        return tuple(
+            name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0]
+        )
+
+
+def _deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+    """Return the deepest contact of each pair."""
+    deepest: dict[tuple[str, str], Contact] = {}
+    for contact in contacts:
+        pair = (contact.link, contact.other)
+        if pair not in deepest or contact.distance < deepest[pair].distance:
+            deepest[pair] = contact
+    return tuple(deepest.values())

@@ -1,0 +1,208 @@
+"""Lists everything doubtful in scenes, robots and meshes, past the first error."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from tqdm import tqdm
+
+from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, GeometryError, Severity
+from .formats import xml_scene
+from .formats.detect import is_robot_file, is_xml
+from .formats.lexer import Scanner
+from .formats.reading import read_scene
+from .formats.robot import read_robot
+from .formats.source import read_source
+from .formats.xml import parse_xml
+from .geometry.analysis import analyse, mesh_diagnostics
+from .geometry.loading import READABLE, load_mesh
+from .geometry.resolve import resolve_all
+from .kinematics import RobotKinematics
+from .model import Body, Environment, MultiBody, MultiBodyKind
+from .options import Options, PathArgument
+
+_ROOT_TAG = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*<([A-Za-z_][\w:.\-]*)", re.DOTALL)
+_SCENE_TAGS = ("environment", "motionplanning", "motion_planning", "mpproblem", "problem")
+_SNIFFED_BYTES = 1 << 16
+
+
+class Kind(StrEnum):
+    """What a file is taken for."""
+
+    SCENE = "scene"
+    ROBOT = "robot"
+    MESH = "mesh"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True)
+class LintResult:
+    """What was found in one file and in the files that it names.
+
+    Attributes:
+        path: The file.
+        kind: What it was taken for.
+        diagnostics: The findings; each place is reported once, for the first file that leads to it.
+    """
+
+    path: str
+    kind: Kind
+    diagnostics: tuple[Diagnostic, ...]
+
+    def count(self, severity: Severity) -> int:
+        """Return the number of findings of one severity."""
+        return sum(d.severity is severity for d in self.diagnostics)
+
+
+def lint(
+    paths: Iterable[PathArgument], options: Options | None = None, *, progress: bool = False
+) -> tuple[LintResult, ...]:
+    """Look for everything doubtful.
+
+    Scenes are read, their meshes analysed, and loaded into MuJoCo to see what touches at home. After an error the
+    other meshes of the scene, and the other files, are still looked at.
+
+    Args:
+        paths: Scenes, robot files, meshes; folders are searched for `.env`, `.robot` and `.xml` files.
+        options: How to read and load; `strict` is ignored, so that a warning does not end a file.
+        progress: Show a progress bar on a terminal.
+
+    Raises:
+        ValueError, NotImplementedError: An option has a value that it cannot take.
+    """
+    chosen = dataclasses.replace(options or Options(), strict=False)
+    files = _files(paths)
+    results: list[LintResult] = []
+    seen: set[Diagnostic] = set()
+    bar = tqdm(files, unit="file", delay=1, leave=False, disable=not (progress and sys.stderr.isatty()))
+    for path in bar:
+        kind = _kind(path)
+        try:
+            found = dict.fromkeys(_lint_file(path, kind, chosen))
+        except Exception as error:
+            error.add_note(f"while linting {path}")
+            raise
+        # What has no place of its own belongs to the file; several scenes may well lack a robot.
+        fresh = tuple(d for d in found if d.span is None or d not in seen)
+        seen.update(fresh)
+        results.append(LintResult(path, kind, fresh))
+    return tuple(results)
+
+
+def _files(paths: Iterable[PathArgument]) -> list[str]:
+    """Return the files to look at, each once."""
+    files: dict[str, str] = {}
+    for path in map(os.fspath, paths):
+        for file in sorted(_search(path)) if os.path.isdir(path) else [path]:
+            files.setdefault(os.path.realpath(file), file)
+    return list(files.values())
+
+
+def _search(folder: str) -> Iterator[str]:
+    for where, folders, names in os.walk(folder):
+        folders[:] = [f for f in folders if not f.startswith(".")]
+        for name in names:
+            path = os.path.join(where, name)
+            extension = os.path.splitext(name)[1].lower()
+            if extension in (".env", ".robot") or (extension == ".xml" and _kind(path) is not Kind.OTHER):
+                yield path
+
+
+def _kind(path: str) -> Kind:
+    extension = Path(path).suffix.lower()
+    if extension in READABLE:
+        return Kind.MESH
+    if extension == ".robot":
+        return Kind.ROBOT
+    return _xml_kind(path) if extension == ".xml" else Kind.SCENE
+
+
+def _xml_kind(path: str) -> Kind:
+    try:
+        with open(path, "rb") as file:
+            start = file.read(_SNIFFED_BYTES)
+    except OSError:
+        return Kind.SCENE  # whose reader says what is wrong
+    root = _ROOT_TAG.match(start.removeprefix(b"\xef\xbb\xbf"))
+    tag = root.group(1).decode("ascii", "replace").lower() if root else ""
+    if tag in _SCENE_TAGS:
+        return Kind.SCENE
+    # A URDF file has a <robot>, too.
+    return Kind.ROBOT if tag == "robot" and b"<multibody" in start.lower() else Kind.OTHER
+
+
+def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
+    log = DiagnosticLog()
+    try:
+        if kind is Kind.SCENE:
+            return _lint_scene(path, options)
+        if kind is Kind.ROBOT:
+            _lint_robot(path, options, log)
+        elif kind is Kind.MESH:
+            _lint_mesh(Path(path), options, log)
+        else:
+            log.info("ENV132", path, f"{path} is XML, but no scene and no robot; skipped")
+    except Env2MjcfError as error:
+        return error.diagnostics
+    return tuple(log)
+
+
+def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
+    # Imported here because MuJoCo is slow to import, and robots and meshes do not need it.
+    from .simulation.preparing import prepare
+
+    try:
+        if is_robot_file(read_source(path, DiagnosticLog(), options.limits)):
+            log = DiagnosticLog()
+            _lint_robot(path, options, log)
+            return tuple(log)
+        return prepare(path, options, DiagnosticLog()).diagnostics
+    except GeometryError as error:
+        # The first bad mesh ends the loading, so that each has to be looked at alone.
+        return [*error.diagnostics[:-1], *_lint_meshes(path, options, error)]
+    except Env2MjcfError as error:
+        return error.diagnostics
+
+
+def _lint_meshes(path: str, options: Options, error: GeometryError) -> list[Diagnostic]:
+    environment = read_scene(path, options, DiagnosticLog())
+    bodies = {b.filename: b for m in environment.multibodies for b in m.bodies}
+    found: list[Diagnostic] = []
+    for body in bodies.values():
+        log = DiagnosticLog()
+        try:
+            _lint_mesh(_resolved(environment, body, options, log), options, log, body)
+        except Env2MjcfError as wrong:
+            found += wrong.diagnostics
+        else:
+            found += log
+    if any(d.severity is Severity.ERROR for d in found):
+        return found
+    return [*found, error.diagnostic]
+
+
+def _resolved(environment: Environment, body: Body, options: Options, log: DiagnosticLog) -> Path:
+    alone = dataclasses.replace(environment, multibodies=(MultiBody(MultiBodyKind.PASSIVE, (body,)),))
+    return resolve_all(alone, options, log)[body.filename]
+
+
+def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
+    source = read_source(path, log, options.limits)
+    if is_xml(source):
+        robot = xml_scene.read_robot(parse_xml(source, log, options.limits))
+    else:
+        robot = read_robot(Scanner(source, log, options.limits))
+    RobotKinematics.of(robot, log).home(log)
+
+
+def _lint_mesh(path: Path, options: Options, log: DiagnosticLog, body: Body | None = None) -> None:
+    mesh = load_mesh(path, log, options.limits)
+    subject, span = (body.filename, body.span) if body else (str(path), None)
+    mesh_diagnostics(mesh, analyse(mesh), log, subject=subject, span=span)

@@ -1,0 +1,1 @@
+"""Pictures of scenes; needs the extra `view`, and GL only in processes of its own."""
