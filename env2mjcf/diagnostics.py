@@ -47,6 +47,7 @@ CATALOGUE: dict[str, str] = {
     "GEO238": "Vertices of a mesh are used by no face.",
     "GEO239": "Edges of a mesh have more than two faces.",
     "GEO240": "A mesh that is not convex collides as its convex hull, by choice.",
+    "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
     # Bodies and connections.
     # What is written for MuJoCo.
     # Configurations and queries.

@@ -39,7 +39,7 @@ class RobotKinematics:
         Raises:
             KinematicsError: A body is neither a base nor reached from one.
         """
-        tree = build_tree(multibody, log or DiagnosticLog())
+        tree = build_tree(multibody, DiagnosticLog() if log is None else log)
         return cls(multibody, tree, degrees_of_freedom(multibody, tree))
 
     @property
@@ -126,7 +126,7 @@ class RobotKinematics:
 
         Joint values are reduced by whole turns, then clipped to their limits, each clipping with a diagnostic.
         """
-        log = log or DiagnosticLog()
+        log = DiagnosticLog() if log is None else log
         q = np.array([self._home_value(d) for d in self.dofs], dtype=np.float64)
         for i, dof in enumerate(self.dofs):
             if dof.connection is None or dof.periodic or dof.lower <= q[i] <= dof.upper:

@@ -99,17 +99,17 @@ def lint(
 def _files(paths: Iterable[PathArgument]) -> list[str]:
     """Return the files to look at, each once."""
     files: dict[str, str] = {}
-    for path in map(os.fspath, paths):
-        for file in sorted(_search(path)) if os.path.isdir(path) else [path]:
+    for path in paths:
+        for file in sorted(_search(path)) if os.path.isdir(path) else [os.fspath(path)]:
             files.setdefault(os.path.realpath(file), file)
     return list(files.values())
 
 
-def _search(folder: str) -> Iterator[str]:
+def _search(folder: PathArgument) -> Iterator[str]:
     for where, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]
         for name in names:
-            path = os.path.join(where, name)
+            path = os.path.normpath(os.path.join(where, name))
             extension = os.path.splitext(name)[1].lower()
             if extension in (".env", ".robot") or (extension == ".xml" and _kind(path) is not Kind.OTHER):
                 yield path

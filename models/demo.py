@@ -29,13 +29,13 @@ GHOSTS = (0.0, 0.33)
 GALLERY: tuple[tuple[str, dict[str, str], str, float], ...] = (
     ("seed/seed.env", {}, "home", 1.15),
     ("gantry/gantry.env", {}, "home", 1.1),
-    ("bug-trap/bug-trap.env", {"query": "bug-trap/bug-trap.query"}, "goal", 1.1),
+    ("bug-trap/bug-trap.env", {"query": "bug-trap/bug-trap.query"}, "goal", 0.72),
     ("spherical-arm/spherical-arm.env", {"query": "spherical-arm/spherical-arm.query"}, "start", 1.25),
     ("closed-chain/closed-chain.env", {}, "home", 1.3),
     ("alpha/alpha.env", {"query": "alpha/alpha.query"}, "start", 1.05),
-    ("two-robots/two-robots.env", {}, "home", 1.35),
+    ("two-robots/two-robots.env", {}, "home", 1.25),
     ("maze/maze.xml", {}, "start", 1.3),
-    ("xml-arm/xml-arm.xml", {}, "start", 1.4),
+    ("xml-arm/xml-arm.xml", {}, "start", 1.25),
 )
 COLUMNS, TILE, CAPTION = 3, (400, 300), 26
 

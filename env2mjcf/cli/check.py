@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 from rich.text import Text
+from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
@@ -19,7 +21,7 @@ from .printing import one_line, print_diagnostics, print_json, print_parts, work
 
 if TYPE_CHECKING:
     from ..simulation.scene import Scene
-    from .configurations import Configurations
+    from .rows import Configurations
     from .verdicts import Judge, Verdict
 
 # More configurations than this are not listed one by one unless asked for.
@@ -34,7 +36,7 @@ class Check:
     the file), as many as there are degrees of freedom of all robots, or of one robot behind its index. A .query file,
     or a .csv or .npy file with such rows, holds many. Without any: the scene's own tasks, else home.
 
-    examples:
+    Examples:
       env2mjcf check serial.env -0.5 0 0 0.125 0.25 0
       env2mjcf check serial.env --query serial.query
       env2mjcf check box.env samples.npy --robots box.robot --radians
@@ -72,7 +74,8 @@ class Check:
         print_diagnostics(log, self.output.verbose)
         judge = Judge(scene, scene.space.check(rows.q), rows.labels)
         if self.output.json:
-            verdicts = [judge.verdict(i) for i in range(len(rows.q))]
+            rows_bar = tqdm(range(len(rows.q)), unit="q", delay=1, leave=False, disable=not sys.stderr.isatty())
+            verdicts = [judge.verdict(i) for i in rows_bar]
             print_json({"valid": bool(judge.valid.all()), "dofs": scene.space.names, "configurations": verdicts})
         else:
             print_parts(self._lines(judge))
@@ -89,13 +92,18 @@ class Check:
         return of_numbers(scene, words, self.radians)
 
     def _lines(self, judge: Judge) -> Iterator[Text]:
+        rough = False
         every = self.all or len(judge.valid) <= _LISTED
         chosen = range(len(judge.valid)) if every else np.flatnonzero(~judge.valid).tolist()
         for i in chosen if self.all else chosen[:_LISTED]:
-            yield from _verdict_lines(judge.verdict(i))
+            verdict = judge.verdict(i)
+            rough |= judge.rough(verdict)
+            yield from _verdict_lines(verdict)
         left = len(chosen) - _LISTED
         if left > 0 and not self.all:
             yield Text(f"... and {left} more that are invalid (--all lists every configuration)", "dim")
+        if rough:
+            yield Text("depths at bodies that are not convex are rough: such meshes collide as thin plates", "dim")
         yield _summary(judge)
 
 

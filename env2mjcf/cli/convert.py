@@ -20,7 +20,7 @@ from .printing import one_line, print_diagnostics, print_json, working
 class Convert:
     """Write a scene as a folder of MJCF and assets, and print the path of the MJCF file.
 
-    examples:
+    Examples:
       env2mjcf convert serial.env                      serial_mjcf/serial.xml
       env2mjcf convert box.env out/ --robots box.robot
       env2mjcf convert puzzle.env -o out/puzzle.xml --scale 0.01 --actuators position

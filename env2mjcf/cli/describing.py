@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..dialects import RULES
-from ..formats.reading import read
 from ..kinematics import RobotKinematics
 from ..model import Boundary, Dialect, Environment, Resolution, scaled
 from ..names import body_names, dof_names
 from ..space import ConfigurationSpace
+from .readings import Readings, compare_readings
 
 _TOLD_BY = {
     Dialect.A: "begins with a count, then 'MultiBody'",
@@ -49,15 +47,6 @@ class RobotSummary:
     base: str
     links: tuple[str, ...]
     dofs: tuple[DofSummary, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Readings:
-    """How far the planner's and the page's reading put a link's origin from each other at home, in metres."""
-
-    other: str
-    distance: float
-    link: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,28 +103,6 @@ def describe(environment: Environment, options: Mapping[str, Any]) -> SceneSumma
     )
 
 
-def compare_readings(environment: Environment, options: Mapping[str, Any]) -> Readings | None:
-    """Return how far apart the two readings of dialect A's connections put the links at home; None elsewhere."""
-    if environment.dialect is not Dialect.A or not any(r.connections for r in environment.robots):
-        return None
-    other = "page" if environment.semantics == "planner" else "planner"
-    changed = read(environment.path, **{**options, "semantics": other, "strict": False})
-    here, there = (_origins_at_home(scaled(e, options["scale"])) for e in (environment, changed))
-    apart = np.linalg.norm(here - there, axis=1)
-    worst = int(apart.argmax())
-    return Readings(other, float(apart[worst]), _robot_links(environment)[worst])
-
-
-def _origins_at_home(environment: Environment) -> Any:
-    robots = [RobotKinematics.of(r) for r in environment.robots]
-    return np.concatenate([r.forward(r.home())[:, :3, 3] for r in robots])
-
-
-def _robot_links(environment: Environment) -> list[str]:
-    names = body_names(environment)
-    return [n for r in environment.robots for n in _names_of(environment, (r,), names)]
-
-
 def _names_of(environment: Environment, some: tuple[Any, ...], names: Mapping[int, tuple[str, ...]]) -> tuple[str, ...]:
     """Return the names of the bodies of some multibodies, which are told apart by identity."""
     chosen = {id(m) for m in some}
@@ -173,11 +140,21 @@ def _robots(environment: Environment, metres: float) -> list[RobotSummary]:
 
 
 def _told_by(environment: Environment, options: Mapping[str, Any]) -> str:
-    if _begins_as_xml(Path(environment.path)):
-        if environment.dialect is Dialect.E:
-            return "XML"
-        return f"the environment that the XML names {_TOLD_BY[environment.dialect]}"
-    return "as --dialect says" if options["dialect"] else _TOLD_BY[environment.dialect]
+    path = _environment_file(environment)
+    if _begins_as_xml(Path(path)):
+        reason = "XML"
+    else:
+        reason = "as --dialect says" if options["dialect"] else _TOLD_BY[environment.dialect]
+    return reason if path == environment.path else f"{path}: {reason}"
+
+
+def _environment_file(environment: Environment) -> str:
+    """Return the file that describes the environment, which a problem XML names."""
+    own = [m.span for m in environment.multibodies if m.robot_file is None]
+    spans = [environment.boundary.span if environment.boundary else None, *own]
+    # A problem XML may give the boundary itself.
+    named = [s.path for s in spans if s is not None and s.path != environment.path]
+    return named[0] if named else environment.path
 
 
 def _begins_as_xml(path: Path) -> bool:

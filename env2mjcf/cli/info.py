@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Info:
     """Say what a scene holds and how it is read: dialect, robots, degrees of freedom, obstacles, meshes.
 
-    examples:
+    Examples:
       env2mjcf info serial.env
       env2mjcf info box.env --robots box.robot --query box.query
       env2mjcf info problem.xml --pairs
@@ -52,27 +52,28 @@ class Info:
         chosen = Options.from_keywords(keywords(self.options))
         environment = read_scene(self.scene, chosen, DiagnosticLog(chosen.strict))
         summary = describe(environment, keywords(chosen))
-        scene, error = self._load(chosen)
-        diagnostics = error.diagnostics if error or not scene else scene.diagnostics
+        loaded = self._load(chosen)
+        error = loaded if isinstance(loaded, Env2MjcfError) else None
+        scene = None if isinstance(loaded, Env2MjcfError) else loaded
         if self.output.json:
             facts: dict[str, Any] = self._facts(summary, scene)
             if error:
                 facts["error"] = plain(error.diagnostic)
-            print_json({**facts, "diagnostics": diagnostics})
+            print_json({**facts, "diagnostics": loaded.diagnostics})
         else:
             print_parts(self._parts(summary, scene))
         # Findings that are only worth knowing are part of what was asked for.
-        print_diagnostics(diagnostics, verbose=not self.output.json or self.output.verbose)
+        print_diagnostics(loaded.diagnostics, verbose=not self.output.json or self.output.verbose)
         return 3 if error else 0
 
-    def _load(self, options: Options) -> tuple[Scene | None, Env2MjcfError | None]:
+    def _load(self, options: Options) -> Scene | Env2MjcfError:
         from ..simulation.preparing import prepare
 
         try:
             with working(f"loading {self.scene}"):
-                return prepare(self.scene, options, DiagnosticLog(options.strict)), None
+                return prepare(self.scene, options, DiagnosticLog(options.strict))
         except Env2MjcfError as error:
-            return None, error
+            return error
 
     def _facts(self, summary: SceneSummary, scene: Scene | None) -> dict[str, Any]:
         facts: dict[str, Any] = plain(summary)

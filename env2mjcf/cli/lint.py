@@ -29,7 +29,7 @@ class Lint:
     Folders are searched for .env, .robot and .xml files. An error in one file does not keep the others from being
     looked at. The exit status is 1 if there is an error; with --strict also if there is a warning.
 
-    examples:
+    Examples:
       env2mjcf lint scenes/
       env2mjcf lint a.env b.env part.g --strict
       env2mjcf lint scenes/ --github                  annotations for GitHub Actions

@@ -9,7 +9,7 @@ import math
 import re
 import sys
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -64,7 +64,7 @@ def print_parts(parts: Iterable[RenderableType]) -> None:
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
+def working(what: str) -> Generator[None]:
     """Say on a terminal that something is being done, for as long as it takes."""
     if not sys.stderr.isatty():
         yield
@@ -76,6 +76,7 @@ def working(what: str) -> Iterator[None]:
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
     """Print diagnostics to stderr; those that are only worth knowing on request."""
+    sys.stdout.flush()  # so that results stand before what is said about them
     console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False, soft_wrap=True)
     for diagnostic in diagnostics:
         if verbose or diagnostic.severity is not Severity.INFO:

@@ -49,9 +49,7 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     yield Text(f"\nMeshes, collision {report.collision}", "bold")
     table = _table("file", "triangles", "closed", "convex", "cells", "collides as", right=(1, 4))
     for mesh in report.meshes:
-        table.add_row(
-            *_cells(mesh.file, mesh.triangles, _yes(mesh.closed), _yes(mesh.convex), mesh.cells, mesh.note)
-        )
+        table.add_row(*_cells(mesh.file, mesh.triangles, _yes(mesh.closed), _yes(mesh.convex), mesh.cells, mesh.note))
     yield _indented(table)
     yield Text("\nWhole scene", "bold")
     yield _facts(

@@ -60,6 +60,8 @@ class Judge:
         assembly = scene.compiled.assembly
         links = [p for r in assembly.robots for p in r.links]
         self._boundaries = [(p.name, BoundaryTest(assembly.environment.boundary, [p])) for p in links]
+        hulls = scene.report.collision == "hull"
+        self._plates = {p.name for p in assembly.parts() if not hulls and not p.analysis.convex}
         self.in_limits = scene.space.within_limits(q)
         self.in_collision = scene.in_collision(q, progress=True)
         self.inside = BoundaryTest(assembly.environment.boundary, links).inside(scene.link_poses(q))
@@ -79,6 +81,10 @@ class Judge:
             _deepest(scene.contacts(q)) if collides else (),
         )
 
+    def rough(self, verdict: Verdict) -> bool:
+        """Whether a depth is that of a thin plate, not of a body."""
+        return any(name in self._plates for c in verdict.contacts for name in (c.link, c.other))
+
     def _broken_limits(self, q: Array) -> tuple[BrokenLimit, ...]:
         space = self._scene.space
         beyond = ~space.periodic & ((q < space.lower) | (q > space.upper))
@@ -89,9 +95,7 @@ class Judge:
 
     def _outside(self, q: Array) -> tuple[str, ...]:
         poses = self._scene.link_poses(q[None])
-        return tuple(
-            name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0]
-        )
+        return tuple(name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0])
 
 
 def _deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:

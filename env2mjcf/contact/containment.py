@@ -80,7 +80,7 @@ class Containment:
         inside = np.zeros(near.shape, dtype=bool)
         if near.any():
             inside[near] = np.abs(winding_numbers(local[near], analysis.vertices, analysis.faces)) > 0.5
-        return inside.any(axis=-1)
+        return np.asarray(inside.any(axis=-1))
 
 
 def _component_points(part: Part) -> Array:

@@ -16,7 +16,7 @@ class MujocoEngine:
     """Asks `mj_collision` about configurations.
 
     The engine has a model of its own, in which only links and obstacles collide: ground and walls act in simulation
-    alone, and pairs that cannot move are decided elsewhere.
+    alone. It also sees the explicit pairs of bodies that cannot move, which are decided elsewhere.
 
     Args:
         model: The scene's model.
@@ -33,8 +33,6 @@ class MujocoEngine:
         self._model = copy.copy(model)
         self._model.geom_contype[self._owner < 0] = 0
         self._model.geom_conaffinity[self._owner < 0] = 0
-        if self._model.npair:
-            self._model.pair_margin[:] = -mujoco.mjMAXVAL
         # One contact is enough for a verdict, and for where two cells touch.
         self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
 

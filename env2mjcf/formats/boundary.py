@@ -1,4 +1,4 @@
-"""The `Boundary` of dialects C to E (env-format sections 6 to 8)."""
+"""The `Boundary` of dialects C to E, in text and XML (env-format sections 6 to 8)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from ..model import Boundary, BoundaryShape
 from .blocks import read_range
 from .lexer import Scanner
 
-_SHAPES = {s.value: s for s in BoundaryShape}
+SHAPES = {s.value: s for s in BoundaryShape}
 _AXES = "xyz"
 
 
@@ -17,17 +17,22 @@ def read_boundary(scan: Scanner) -> Boundary:
     if scan.peek() == "[":
         # The newest planner's own writer leaves the word out (env-format section 8.1).
         shape = BoundaryShape.BOX
-        scan.log.warn(FormatError, "ENV206", "Boundary", "a boundary without a shape; read as Box", span=scan.span())
-    else:
-        shape = scan.keyword(_SHAPES, "boundary shape", code="ENV125")
-    span = scan.span(start)
+        scan.log.warn(
+            FormatError, "ENV206", "Boundary", "a boundary without a shape; read as Box", hint="write Boundary Box [",
+            span=scan.span(),
+        )  # fmt: skip
+        return read_extent(scan, shape, scan.span())
+    shape = scan.keyword(SHAPES, "boundary shape", code="ENV125")
+    return read_extent(scan, shape, scan.span(start))
+
+
+def read_extent(scan: Scanner, shape: BoundaryShape, span: Span) -> Boundary:
+    """Read the ranges of a box, or the centre and radius of a ball, in brackets or as dialect C has them."""
     brackets = scan.peek() == "["
     if brackets:
         scan.punctuation("[", "before the boundary")
-    if shape in (BoundaryShape.BOX, BoundaryShape.BOX2D):
-        boundary = _read_box(scan, shape, span, brackets)
-    else:
-        boundary = _read_ball(scan, shape, span, brackets)
+    read = _read_box if shape in (BoundaryShape.BOX, BoundaryShape.BOX2D) else _read_ball
+    boundary = read(scan, shape, span, brackets)
     if brackets:
         scan.punctuation("]", "after the boundary")
     return boundary
@@ -40,9 +45,14 @@ def _read_box(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) -
             scan.punctuation(";", "between two ranges")
         ranges.append(read_range(scan, f"the {_AXES[len(ranges)]} range of the boundary"))
     if len(ranges) < 2:
-        scan.fail("ENV119", "a box with one range; expected two or three (x, y and perhaps z)", span=span)
+        scan.fail(
+            "ENV119", "a box with one range; expected two or three (x, y and perhaps z)",
+            hint="write lower:upper for each axis", span=span,
+        )  # fmt: skip
     if shape is BoundaryShape.BOX2D and len(ranges) == 3:
-        scan.log.warn(FormatError, "ENV207", "Boundary", "Box2D with three ranges; all are used", span=span)
+        scan.log.warn(
+            FormatError, "ENV207", "Boundary", "Box2D with three ranges; all are used", hint="write Box", span=span
+        )
     if shape is BoundaryShape.BOX and len(ranges) == 2:
         scan.log.info("ENV302", "Boundary", "a Box with two ranges leaves z unbounded", span=span)
     return Boundary(shape, lower=tuple(r[0] for r in ranges), upper=tuple(r[1] for r in ranges), span=span)
@@ -64,5 +74,8 @@ def _read_ball(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) 
     at = scan.position
     radius = scan.number("radius")
     if radius <= 0:
-        scan.fail("ENV119", f"radius {radius:g}; expected a positive number", span=scan.span(at))
+        scan.fail(
+            "ENV119", f"radius {radius:g}; expected a positive number", hint="write the radius behind the centre",
+            span=scan.span(at),
+        )  # fmt: skip
     return Boundary(shape, center=tuple(center), radius=radius, span=span)

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import re
 
-from ..errors import DiagnosticLog, FormatError, did_you_mean
+from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
 from ..model import Dialect
+from .lexer import misspelling
 from .source import Source
 
 _COMMENT = re.compile(r"#[^\r\n]*")
-_ROBOT_TAGS = re.compile(r"^\s*(active|nonholonomic|surface)\b", re.IGNORECASE | re.MULTILINE)
-_LIMITS = re.compile(r"\b(revolute|spherical)\s+\S+:", re.IGNORECASE)
-_LATER_TAGS = ("Active", "Passive", "Internal", "Surface", "NonHolonomic")
+_COUNT = re.compile(r"[0-9]+")
+# Every tag is at most this long, so that a longer word need not be compared with them.
+_LONGEST_TAG = 16
+_TAG_LIKE = re.compile(rf"(?<!\S)[AaNnSs][A-Za-z]{{3,{_LONGEST_TAG}}}(?!\S)")
+_BOUNDARY = re.compile(r"\s*\S+\s+(?:[A-Za-z]\w*\s*)?(\[)?")
+_LIMITS = re.compile(r"\b(revolute|spherical)\s+[^\s:]+:", re.IGNORECASE)
+_ROBOT_TAGS = ("Active", "NonHolonomic", "Surface")
+_LATER_TAGS = (*_ROBOT_TAGS, "Passive", "Internal")
 
 
 def is_xml(source: Source) -> bool:
@@ -21,8 +27,8 @@ def is_xml(source: Source) -> bool:
 
 def is_robot_file(source: Source) -> bool:
     """Whether the text is a dialect E robot file: a count, then a mesh file."""
-    words = _COMMENT.sub("", source.text).split(maxsplit=2)
-    return len(words) > 1 and words[0].isdigit() and "." in words[1]
+    words = _first_words(_COMMENT.sub("", source.text))
+    return bool(_COUNT.fullmatch(words[0])) and "." in words[1]
 
 
 def detect(source: Source, log: DiagnosticLog) -> Dialect:
@@ -32,35 +38,62 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
         FormatError: The text is none of them.
     """
     text = _COMMENT.sub("", source.text)
-    words = text.split(maxsplit=2)
-    if not words:
-        log.fail(FormatError, "ENV130", source.path, f"{source.path} is empty", span=source.span(0))
-    first = words[0]
-    if first.lower() == "boundary" or did_you_mean(first, ("Boundary",)):
+    first, second = _first_words(text)
+    if not first:
+        log.fail(
+            FormatError, "ENV130", source.path, f"{source.path} is empty; expected an environment",
+            hint="was it saved?", span=source.span(0),
+        )  # fmt: skip
+    if _means(first, ("Boundary",)):
         return _with_boundary(text)
-    if re.fullmatch(r"\d+", first) and len(words) > 1:
-        second = words[1]
-        if did_you_mean(second, ("MultiBody",)):
+    if _COUNT.fullmatch(first):
+        if _means(second, ("MultiBody",)):
             return Dialect.A
-        if second.lower() in {t.lower() for t in _LATER_TAGS} or did_you_mean(second, _LATER_TAGS):
+        if _means(second, _LATER_TAGS):
             return Dialect.C if _LIMITS.search(text) else Dialect.B
         if "." in second:
             log.fail(
-                FormatError, "ENV131", source.path, f"{source.path} is a robot file, not an environment",
+                FormatError, "ENV131", source.path,
+                f"{source.path} is a robot file, not an environment: a mesh file follows its count",
                 hint="read the environment, and give this file as robots=[...] (--robots)",
-                span=source.line_span(1 + source.text[: source.text.find(second)].count("\n"), second),
+                span=_place(source, second),
             )  # fmt: skip
-    at = source.text.find(first)
+        expected = "'MultiBody', 'Active', 'Passive', 'Internal' or 'Surface' behind the number of multibodies"
+        wrong = second or first
+    else:
+        expected = "a number of multibodies, 'Boundary' or XML"
+        wrong = first
     log.fail(
         FormatError, "ENV130", source.path,
-        f"{source.path} is no environment: it begins with {first[:40]!r}; expected a number of multibodies, "
-        "'Boundary' or XML",
-        span=source.span(at, at + len(first)),
+        f"{source.path} is no environment: found {wrong[:40]!r}; expected {expected}",
+        hint="name an environment, or choose its dialect with dialect= (--dialect)", span=_place(source, wrong),
     )  # fmt: skip
 
 
+def _first_words(text: str) -> tuple[str, str]:
+    words = (*text.split(maxsplit=2)[:2], "", "")
+    return words[0], words[1]
+
+
+def _means(word: str, tags: tuple[str, ...]) -> bool:
+    return len(word) <= _LONGEST_TAG and bool(did_you_mean(word, tags))
+
+
+def _place(source: Source, word: str) -> Span:
+    for start, line in source.lines():
+        at = _COMMENT.sub("", line).find(word)
+        if at >= 0:
+            return source.span(start + at, start + at + len(word))
+    return source.span(0)
+
+
 def _with_boundary(text: str) -> Dialect:
-    bracket = re.match(r"\s*\S+\s+(?:[A-Za-z]\w*\s*)?(\[)?", text)
-    if bracket and not bracket.group(1):
+    match = _BOUNDARY.match(text)
+    if match and not match.group(1):
         return Dialect.C
-    return Dialect.D if _ROBOT_TAGS.search(text) else Dialect.E
+    return Dialect.D if any(map(_is_robot_tag, set(_TAG_LIKE.findall(text)))) else Dialect.E
+
+
+def _is_robot_tag(word: str) -> bool:
+    # `-a( Surface )` and the like are no tags; a misspelt tag is one, which keeps its dialect's kinematics.
+    return misspelling(word, _LATER_TAGS) in _ROBOT_TAGS

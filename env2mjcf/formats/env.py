@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
 from ..errors import FormatError
 from ..model import Boundary, Dialect, Environment, MultiBody, Resolution
 from . import later, legacy
-from .blocks import Grammar, check_count
+from .blocks import Grammar, check_limit, is_multibody_tag, warn_of_count
 from .boundary import read_boundary
 from .lexer import Scanner
 
@@ -22,6 +21,8 @@ _RESOLUTION_TAGS = {
 }
 _HEADER_TAGS = {**_RESOLUTION_TAGS, "Multibodies": None, "Obstacles": None}
 _ENVIRONMENT_VERSIONS = {"0", "20001022", "20020327"}
+# Classes whose configurations are the base, then the joints; others have a layout of their own (section 9.5).
+_CONFIGURATION_CLASSES = {"cfg_free", "cfg_free_tree", "cfg_free_serial", "cfg_fixed_tree", "cfg_free_cc"}
 
 
 def read_env(scan: Scanner, dialect: Dialect, semantics: str) -> Environment:
@@ -32,7 +33,7 @@ def read_env(scan: Scanner, dialect: Dialect, semantics: str) -> Environment:
     """
     grammar = Grammar.of(dialect, semantics)
     boundary, resolution = None, Resolution()
-    if dialect in (Dialect.A, Dialect.B):
+    if dialect is Dialect.A:
         _check_header(scan)
     if scan.peek_word().lower().startswith("bound"):
         boundary, resolution = _read_preamble(scan)
@@ -53,16 +54,23 @@ def read_env(scan: Scanner, dialect: Dialect, semantics: str) -> Environment:
 
 
 def _check_header(scan: Scanner) -> None:
-    """Judge dialect A's `# Environment Version N` line (env-format section 3.1)."""
+    """Judge dialect A's `#Environment Version N` and `#Cfg_...` lines (env-format section 3.1)."""
     scan.peek()
     for comment in scan.comments:
         words = comment.text.lstrip("#").split()
         if len(words) >= 3 and words[0] == "Environment" and "Version" in words[1]:
             if words[2] not in _ENVIRONMENT_VERSIONS:
                 scan.log.warn(
-                    FormatError, "ENV208", "header", f"unknown environment version {words[2]!r}", span=comment.span
-                )
-            return
+                    FormatError, "ENV208", "header",
+                    f"unknown environment version {words[2]!r}; expected 0, 20001022 or 20020327",
+                    hint="the original reader stops here; this one goes on", span=comment.span,
+                )  # fmt: skip
+        elif words and words[0].lower().startswith("cfg_") and words[0].lower() not in _CONFIGURATION_CLASSES:
+            scan.log.warn(
+                FormatError, "ENV218", "header",
+                f"configurations of class {words[0]} have a layout of their own; read as base, then joints",
+                hint="compare the names of the degrees of freedom with the query", span=comment.span,
+            )  # fmt: skip
 
 
 def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
@@ -75,7 +83,7 @@ def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
         if name is None:
             return boundary, Resolution(**resolution)
         value = scan.number(name)
-        if name != "position_factor" and value < 0:
+        if name != "position_factor" and value <= 0:
             scan.log.info("ENV306", name, f"{value:g}: the planner computes a step of its own", span=scan.span(start))
             continue
         resolution[name] = value * math.pi if name == "orientation" else value
@@ -83,28 +91,23 @@ def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
 
 def _read_multibodies(scan: Scanner, grammar: Grammar) -> tuple[tuple[MultiBody, ...], int]:
     start = scan.position
-    declared = scan.count("the number of multibodies", scan.limits.bodies)
+    declared = scan.count("the number of multibodies", scan.limits.bodies, "bodies")
     span = scan.span(start)
     read = legacy.read_multibody if grammar.dialect is Dialect.A else later.read_multibody
     found: list[MultiBody] = []
-    bodies = 0
+    bodies = connections = 0
     while not scan.at_end():
-        if len(found) >= declared and not _multibody_follows(scan, grammar):
+        if len(found) >= declared and not is_multibody_tag(scan.peek_word()):
             _ignore_rest(scan)
             break
         found.append(read(scan, grammar))
         bodies += len(found[-1].bodies)
-        if bodies > scan.limits.bodies:
-            scan.fail("ENV110", f"more than {scan.limits.bodies} bodies", hint="raise limits=Limits(bodies=...)")
-    check_count(scan, declared, len(found), "multibody", span)
+        connections += len(found[-1].connections)
+        check_limit(scan, bodies, scan.limits.bodies, "body", "bodies")
+        check_limit(scan, connections, scan.limits.connections, "connection", "connections")
+    if declared != len(found):
+        warn_of_count(scan, declared, len(found), "multibody", span)
     return tuple(found), declared
-
-
-def _multibody_follows(scan: Scanner, grammar: Grammar) -> bool:
-    word = scan.peek_word().lower()
-    if grammar.dialect is Dialect.A:
-        return word == "multibody"
-    return word in {"active", "passive", "internal", "surface", "nonholonomic"}
 
 
 def _ignore_rest(scan: Scanner) -> None:
@@ -117,23 +120,12 @@ def _ignore_rest(scan: Scanner) -> None:
 
 def _check_ending(scan: Scanner, grammar: Grammar) -> None:
     text = scan.source.text
-    if grammar.rules.needs_final_newline and text and not text[-1].isspace():
-        scan.log.warn(
-            FormatError, "ENV210", scan.source.path,
-            "no newline at the end of the file: the original reader fails here",
-            hint="end the last line with a newline", span=scan.source.span(len(text) - 1),
-        )  # fmt: skip
-
-
-def with_attributes(environment: Environment, attributes: dict[str, str], resolution: Resolution) -> Environment:
-    """Return the environment with the attributes of an `<Environment>` node, which override the file."""
-    old = environment.resolution
-    merged = {
-        f.name: new if (new := getattr(resolution, f.name)) is not None else getattr(old, f.name)
-        for f in dataclasses.fields(Resolution)
-    }
-    return dataclasses.replace(
-        environment,
-        attributes=(*environment.attributes, *sorted(attributes.items())),
-        resolution=Resolution(**merged),
-    )
+    if text and not text[-1].isspace():
+        message = "no newline at the end of the file"
+        hint = "end the last line with a newline, if nothing is missing"
+        span = scan.source.span(len(text) - 1)
+        if grammar.rules.needs_final_newline:
+            message += ": the original reader fails here"
+            scan.log.warn(FormatError, "ENV210", scan.source.path, message, hint=hint, span=span)
+        else:
+            scan.log.info("ENV210", scan.source.path, message, hint=hint, span=span)

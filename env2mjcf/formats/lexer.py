@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
@@ -14,15 +16,36 @@ from .source import Source
 
 T = TypeVar("T")
 
-# What C++ stream extraction accepts: no nan, inf or hexadecimal (env-format section 3.2).
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_INTEGER = re.compile(r"[+-]?\d+")
-_AFTER_NUMBER = re.compile(r"[\s;:,()\[\]#]|$")
+# What C++ stream extraction accepts: no nan, inf or hexadecimal (env-format section 3.2). A number may be followed
+# by a comment, but 1.#INF is how some C++ libraries print infinity.
+_END = r"(?=[\s;:()\[\]]|#(?!INF|IND|QNAN|SNAN)|\Z)"
+_NUMBER = re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?{_END}")
+_INTEGER = re.compile(rf"[+-]?[0-9]+{_END}")
 _WORD = re.compile(r"[^\s;\[\]]+")
 _CHUNK = re.compile(r"\S+")
-_BLANK = re.compile(r"\s+")
+_BLANK = re.compile(r"\s*")
+_REST_OF_LINE = re.compile(r"([^\r\n]*)(?:\r\n|\n|\r)?")
 _COMMENT = re.compile(r"#[^\r\n]*")
-_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)\b", re.IGNORECASE)
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf|[0-9.]+#(INF|IND|QNAN|SNAN))", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_HEXADECIMAL = re.compile(r"[+-]?0x", re.IGNORECASE)
+
+
+def parse_number(word: str) -> float | None:
+    """Return the finite number that a word is, as C++ reads it; None where it is none."""
+    if not _NUMBER.fullmatch(word):
+        return None
+    value = float(word)
+    return value if math.isfinite(value) else None
+
+
+def number_hint(word: str) -> str:
+    """Return what to do about a word that should be a number; empty where it does not look like one."""
+    if _DECIMAL_COMMA.match(word):
+        return "write a decimal point, not a comma"
+    if _HEXADECIMAL.match(word):
+        return "write a decimal number; hexadecimal ones are not read"
+    return "numbers must be finite" if _NOT_FINITE.match(word) or _NUMBER.fullmatch(word) else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +66,27 @@ class Scanner:
         source: The text.
         log: Where findings go.
         limits: Bounds on hostile input.
+        start, end: The part of the text to read; all of it by default.
+        part: What that part is called in messages.
     """
 
-    def __init__(self, source: Source, log: DiagnosticLog, limits: Limits) -> None:
+    def __init__(
+        self,
+        source: Source,
+        log: DiagnosticLog,
+        limits: Limits,
+        start: int = 0,
+        end: int | None = None,
+        part: str = "file",
+    ) -> None:
         self.source = source
         self.log = log
         self.limits = limits
         self.comments: list[Comment] = []
-        self._position = 0
+        self._part = part
+        self._start = start
+        self._position = start
+        self._end = len(source.text) if end is None else end
         self._directives: list[Comment] = []
 
     # Where the scanner stands.
@@ -61,35 +97,33 @@ class Scanner:
         self._skip()
         return self._position
 
-    @property
-    def end_of_last(self) -> int:
-        """Index just behind what was read last."""
-        return self._position
-
     def at_end(self) -> bool:
         """Whether nothing but blanks and comments is left."""
-        return self.position >= len(self.source.text)
+        return self.position >= self._end
 
-    def peek(self, ahead: int = 0) -> str:
-        """Return the next character (or the one `ahead` of it); empty at the end."""
-        at = self.position + ahead
-        return self.source.text[at : at + 1]
+    def peek(self) -> str:
+        """Return the next character; empty at the end."""
+        at = self.position
+        return self.source.text[at] if at < self._end else ""
 
     def peek_word(self) -> str:
         """Return the next word without reading it; empty at the end."""
-        match = _WORD.match(self.source.text, self.position)
+        match = self.next_matches(_WORD)
         return match.group() if match else self.peek()
+
+    def next_matches(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """Match a pattern with what comes next, without reading it."""
+        return pattern.match(self.source.text, self.position, self._end)
 
     def next_is_number(self) -> bool:
         """Whether a number comes next."""
-        match = _NUMBER.match(self.source.text, self.position)
-        return match is not None and _AFTER_NUMBER.match(self.source.text, match.end()) is not None
+        return self.next_matches(_NUMBER) is not None
 
     def span(self, start: int | None = None) -> Span:
         """Return the place from `start` to what was read last, or of the next word."""
         if start is not None:
             return self.source.span(start, self._position)
-        match = _CHUNK.match(self.source.text, self.position)
+        match = self.next_matches(_CHUNK)
         return self.source.span(self._position, match.end() if match else None)
 
     def take_directives(self) -> list[Comment]:
@@ -102,18 +136,18 @@ class Scanner:
 
     def word(self, what: str, *, whole: bool = False) -> Token:
         """Read a word; `whole` keeps brackets and semicolons in it, as file names do."""
-        start = self.position
-        match = (_CHUNK if whole else _WORD).match(self.source.text, start)
+        match = self.next_matches(_CHUNK if whole else _WORD)
         if match is None:
             self.fail_expected(what)
-        if len(match.group()) > self.limits.name_length:
+        length = match.end() - match.start()
+        if length > self.limits.name_length:
             self.fail(
                 "ENV109",
-                f"a word of {len(match.group())} characters; at most {self.limits.name_length} are read",
+                f"a word of {length} characters; at most {self.limits.name_length} are read",
                 hint="raise limits=Limits(name_length=...)",
             )
         self._position = match.end()
-        return Token(match.group(), start, match.end())
+        return Token(match.group(), match.start(), match.end())
 
     def number(self, what: str) -> float:
         """Read a finite number."""
@@ -127,12 +161,13 @@ class Scanner:
         """Read an integer."""
         return int(self._numeral(_INTEGER, what, "an integer"))
 
-    def count(self, what: str, at_most: int) -> int:
-        """Read a count that is neither negative nor beyond a limit."""
+    def count(self, what: str, at_most: int, limit: str) -> int:
+        """Read a count that is neither negative nor beyond a limit, one of the fields of `Limits`."""
         start = self.position
         value = self.integer(what)
-        if value < 0 or value > at_most:
-            self.fail("ENV110", f"{what} is {value}; expected 0 to {at_most}", span=self.source.span(start, self._position))
+        if not 0 <= value <= at_most:
+            hint = f"raise limits=Limits({limit}=...)" if value > 0 else "write how many follow"
+            self.fail("ENV110", f"{what} is {value}; expected 0 to {at_most}", hint=hint, span=self.span(start))
         return value
 
     def punctuation(self, char: str, what: str) -> None:
@@ -150,12 +185,11 @@ class Scanner:
             code: Code of the error for a word that is none of them.
             exact_case: Whether the original reader compared case: another case is a warning then.
         """
-        token = self.word(what)
-        span = self.source.span(token.start, token.end)
+        token = self.word(f"{what} {_either(choices)}")
         if token.text in choices:
             return choices[token.text]
-        folded = {k.lower(): k for k in choices}
-        name = folded.get(token.text.lower())
+        span = self.source.span(token.start, token.end)
+        name = next((k for k in choices if k.lower() == token.text.lower()), None)
         if name is not None:
             if exact_case:
                 self.log.warn(
@@ -163,31 +197,33 @@ class Scanner:
                     hint="the original reader compares case here", span=span,
                 )  # fmt: skip
             return choices[name]
-        guess = did_you_mean(token.text, choices)
-        near = guess.split("'")[1] if guess else ""
-        if near and abs(len(near) - len(token.text)) <= 2 and token.text[:1].lower() == near[:1].lower():
+        name = misspelling(token.text, choices)
+        if name is not None:
             self.log.warn(
-                FormatError, "ENV202", token.text, f"misspelt {what}: {token.text!r} is read as {near!r}", span=span
-            )
-            return choices[near]
-        self.fail(code, f"unknown {what} {token.text!r}; expected {_either(choices)}", hint=guess, span=span)
+                FormatError, "ENV202", token.text, f"misspelt {what}: {token.text!r} is read as {name!r}",
+                hint=f"write {name}", span=span,
+            )  # fmt: skip
+            return choices[name]
+        hint = did_you_mean(token.text, choices) or f"write {_either(choices)} here"
+        found = _shortened(token.text)
+        self.fail(code, f"unknown {what} {found!r}; expected {_either(choices)}", hint=hint, span=span)
 
     def advance(self, position: int) -> None:
         """Step to a position further on."""
         self._position = position
 
-    def rest_of_line(self) -> str:
-        """Read the rest of the current line, comments included."""
-        match = re.compile(r"[^\r\n]*").match(self.source.text, self._position)
+    def line(self) -> Scanner:
+        """Return a scanner over the rest of the current line, and step behind its end."""
+        match = _REST_OF_LINE.match(self.source.text, self._position, self._end)
         assert match is not None
+        rest = Scanner(self.source, self.log, self.limits, match.start(), match.end(1), part="line")
+        rest.comments = self.comments
         self._position = match.end()
-        return match.group()
+        return rest
 
-    def next_line(self) -> None:
-        """Step over one line end, if the scanner stands in front of it."""
-        match = re.compile(r"\r\n|\n|\r").match(self.source.text, self._position)
-        if match:
-            self._position = match.end()
+    def behind_last_line(self) -> bool:
+        """Whether not even an empty line is left."""
+        return self._position >= self._end
 
     # Faults.
 
@@ -197,39 +233,56 @@ class Scanner:
 
     def fail_expected(self, what: str) -> NoReturn:
         """Raise a `FormatError` that says what was expected and what was found instead."""
-        if self.at_end():
-            text = self.source.text.rstrip()
-            place = self.source.span(max(0, len(text) - 1))
-            self.fail("ENV111", f"the file ends where {what} was expected", hint="is the file cut off?", span=place)
-        match = _CHUNK.match(self.source.text, self.position)
-        found = match.group() if match else self.peek()
-        if _NOT_FINITE.match(found):
-            self.fail("ENV113", f"expected {what}, found {found!r}", hint="numbers must be finite")
-        hint = "write a decimal point, not a comma" if re.fullmatch(r"[+-]?\d+,\d+", found) else ""
-        self.fail("ENV112", f"expected {what}, found {found!r}", hint=hint)
+        match = self.next_matches(_CHUNK)
+        if match is None:
+            length = len(self.source.text[self._start : self._end].rstrip())
+            place = self.source.span(self._start + max(0, length - 1))
+            hint = "is the file cut off?" if self._part == "file" else f"write {what}"
+            self.fail("ENV111", f"the {self._part} ends where {what} was expected", hint=hint, span=place)
+        found = _shortened(match.group())
+        hint = number_hint(found)
+        code = "ENV113" if _NOT_FINITE.match(found) else "ENV112"
+        self.fail(code, f"expected {what}, found {found!r}", hint=hint or f"write {what} here")
 
     def _numeral(self, pattern: re.Pattern[str], what: str, kind: str) -> str:
-        match = pattern.match(self.source.text, self.position)
-        if match is None or _AFTER_NUMBER.match(self.source.text, match.end()) is None:
+        match = self.next_matches(pattern)
+        if match is None:
             self.fail_expected(f"{kind} ({what})")
-        if abs(float(match.group())) == float("inf"):
-            self.fail("ENV113", f"{what} {match.group()} is too large for a number", span=self.span())
+        if math.isinf(float(match.group())):
+            found = _shortened(match.group())
+            self.fail("ENV113", f"{what} {found} is too large for a number", hint="numbers must be finite")
         self._position = match.end()
         return match.group()
 
     def _skip(self) -> None:
-        text = self.source.text
+        text, end = self.source.text, self._end
         while True:
-            blank = _BLANK.match(text, self._position)
+            blank = _BLANK.match(text, self._position, end)
             if blank:
                 self._position = blank.end()
-            comment = _COMMENT.match(text, self._position)
-            if not comment:
+            if self._position >= end or text[self._position] != "#":
                 return
+            comment = _COMMENT.match(text, self._position, end)
+            assert comment is not None
             kept = Comment(comment.group(), self.source.span(comment.start(), comment.end()))
             self.comments.append(kept)
             self._directives.append(kept)
             self._position = comment.end()
+
+
+def misspelling(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that a word is a slip of; None where it may well be meant."""
+    if len(word) > 2 * max(map(len, known), default=0):
+        return None
+    folded = {k.lower(): k for k in known}
+    near = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+    if not near or abs(len(near[0]) - len(word)) > 2 or word[:1].lower() != near[0][:1]:
+        return None
+    return folded[near[0]]
+
+
+def _shortened(word: str) -> str:
+    return word if len(word) <= 60 else f"{word[:60]}..."
 
 
 def _either(words: Mapping[str, object]) -> str:

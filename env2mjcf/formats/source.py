@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import bisect
 import os
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
 from ..options import Limits, PathArgument
 
+_LINE_END = re.compile(r"\r\n|\n|\r")
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +29,17 @@ class Source:
 
     path: str
     text: str
-    _starts: tuple[int, ...] = field(default=(), repr=False, compare=False)
+    _starts: tuple[int, ...] = field(default=(0,), repr=False, compare=False)
 
     @classmethod
     def of(cls, path: str, text: str) -> Source:
         """Index the lines of a text; `\\n`, `\\r\\n` and a lone `\\r` end a line."""
-        starts = [0]
-        for i, c in enumerate(text):
-            if c == "\n" or (c == "\r" and text[i + 1 : i + 2] != "\n"):
-                starts.append(i + 1)
-        return cls(path, text, tuple(starts))
+        return cls(path, text, (0, *(m.end() for m in _LINE_END.finditer(text))))
+
+    def lines(self) -> Iterator[tuple[int, str]]:
+        """Iterate the lines: where each starts in the text, and what it says without its line end."""
+        for row, start in enumerate(self._starts):
+            yield start, self._line(row)
 
     def span(self, start: int, end: int | None = None) -> Span:
         """Return the place of `text[start:end]`, cut at the end of its first line."""
@@ -50,79 +56,89 @@ class Source:
         text = self._line(row)
         column = text.find(near) if near else -1
         if column < 0:
-            column = len(text) - len(text.lstrip())
-        return Span(self.path, row + 1, column + 1, max(1, len(near)), text)
+            return Span(self.path, row + 1, len(text) - len(text.lstrip()) + 1, 1, text)
+        return Span(self.path, row + 1, column + 1, len(near), text)
 
     def _line(self, row: int) -> str:
         end = self._starts[row + 1] if row + 1 < len(self._starts) else len(self.text)
         return self.text[self._starts[row] : end].rstrip("\r\n")
 
 
-def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits) -> Source:
+def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at: Span | None = None) -> Source:
     """Read a text file.
 
     UTF-8 with or without a byte order mark; Latin-1 with a warning.
 
+    Args:
+        path: The file.
+        log: Where findings go.
+        limits: Bounds on hostile input.
+        named_at: Where another file names this one, for messages.
+
     Raises:
         FormatError: The file is missing, a folder, unreadable, too large, UTF-16, or not text.
     """
-    name = os.fspath(path)
-    data = _read_bytes(name, log, limits)
+    name = os.fsdecode(path)
+    data = _read_bytes(name, log, limits, named_at)
     if data.startswith(_UTF16_MARKS):
         log.fail(
-            FormatError, "ENV106", name, f"{name} is UTF-16 text; expected UTF-8 or Latin-1", hint="save it as UTF-8"
-        )
+            FormatError, "ENV106", name, f"{name} is UTF-16 text; expected UTF-8 or Latin-1",
+            hint="save it as UTF-8", span=Span(name, 1, 1),
+        )  # fmt: skip
     if b"\0" in data:
-        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        before = data[: data.index(b"\0")].decode("latin-1")
+        place = Source.of(name, before).span(len(before))
         log.fail(
-            FormatError,
-            "ENV107",
-            name,
-            f"{name} is not a text file: line {line} holds a NUL byte; expected an environment, robot or query file",
-            span=Span(name, line, 1),
-        )
+            FormatError, "ENV107", name,
+            f"{name} is not a text file: line {place.line} holds a NUL byte; "
+            "expected an environment, robot or query file",
+            hint="name the scene's text file, not a mesh or an archive", span=Span(name, place.line, place.column),
+        )  # fmt: skip
     try:
-        text = data.decode("utf-8-sig")
+        return Source.of(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        text = data.decode("latin-1")
-        line = data.count(b"\n", 0, error.start) + 1
+        source = Source.of(name, data.decode("latin-1"))
+        place = source.span(error.start)
         log.warn(
-            FormatError,
-            "ENV108",
-            name,
-            f"{name} is not UTF-8 (byte {data[error.start]:#04x} on line {line}); read as Latin-1",
-            hint="save it as UTF-8",
-            span=Source.of(name, text).line_span(line),
-        )
-    return Source.of(name, text)
+            FormatError, "ENV108", name,
+            f"{name} is not UTF-8 (byte {data[error.start]:#04x} on line {place.line}); read as Latin-1",
+            hint="save it as UTF-8", span=place,
+        )  # fmt: skip
+        return source
 
 
-def _read_bytes(name: str, log: DiagnosticLog, limits: Limits) -> bytes:
+def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | None) -> bytes:
+    def fail(code: str, message: str, hint: str) -> NoReturn:
+        log.fail(FormatError, code, name, message, hint=hint, span=named_at)
+
     if "\0" in name:
-        log.fail(FormatError, "ENV101", repr(name), f"the path {name!r} holds a NUL byte")
+        fail("ENV104", f"{name!r} cannot be read: no file has a NUL character in its name", "check the name")
     try:
-        size = os.stat(name).st_size
         if os.path.isdir(name):
-            inside = sorted(p.name for p in Path(name).iterdir() if p.suffix in (".env", ".xml", ".robot", ".query"))
-            hint = f"it holds {', '.join(inside[:8])}" if inside else ""
-            log.fail(FormatError, "ENV102", name, f"{name} is a folder; expected a file", hint=hint)
-        if size > limits.file_bytes:
-            log.fail(
-                FormatError,
-                "ENV105",
-                name,
-                f"{name} has {size} bytes; at most {limits.file_bytes} are read",
-                hint="raise limits=Limits(file_bytes=...)",
-            )
+            inside = [n for n in _names_in(name) if n.endswith(_SCENE_EXTENSIONS)]
+            holds = f"; it holds {', '.join(inside[:8])}" if inside else ""
+            fail("ENV102", f"{name} is a folder; expected a file", f"name the file in it{holds}")
         with open(name, "rb") as file:
-            return file.read()
+            # One more than allowed: the size that the system states is no bound for pipes and devices.
+            data = file.read(limits.file_bytes + 1)
     except FileNotFoundError:
-        folder = Path(name).parent
-        others = sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
-
-
-        log.fail(FormatError, "ENV101", name, f"there is no file {name}", hint=did_you_mean(Path(name).name, others))
+        others = _names_in(Path(name).parent)
+        fail("ENV101", f"there is no file {name}", did_you_mean(Path(name).name, others) or "check the name")
     except PermissionError:
-        log.fail(FormatError, "ENV103", name, f"{name} may not be read", hint="check its permissions")
+        fail("ENV103", f"{name} may not be read", "check its permissions")
     except OSError as error:
-        log.fail(FormatError, "ENV104", name, f"{name} cannot be read: {error.strerror}")
+        fail("ENV104", f"{name} cannot be read: {error.strerror}", "check the name and the disk")
+    if len(data) > limits.file_bytes:
+        fail(
+            "ENV105",
+            f"{name} has more than {limits.file_bytes} bytes; at most so many are read",
+            "raise limits=Limits(file_bytes=...)",
+        )
+    return data
+
+
+def _names_in(folder: str | Path) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except OSError:
+        return []

@@ -168,7 +168,7 @@ def mesh_diagnostics(
         log.warn(GeometryError, code, subject, message, hint=hint, span=span)
 
     def note(code: str, message: str) -> None:
-        log.info(code, subject, message, span=span)  # noqa: PLE1205 -- no logger of the standard library
+        log.info(code, subject, message, span=span)
 
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject, span)

@@ -6,6 +6,9 @@ takes the hull of the points that it is given; so MuJoCo is also asked for the v
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import Any
+
 import numpy as np
 
 from .topology import Floats
@@ -19,8 +22,8 @@ def hull_volume(points: Floats) -> float:
     Raises:
         ValueError: The points are (nearly) coplanar.
     """
-    import mujoco  # only here: the rest of geometry/ works without MuJoCo
-
+    # Imported here, because the rest of geometry/ works without MuJoCo, and as Any, because it has no type stubs.
+    mujoco: Any = import_module("mujoco")
     size = float(np.ptp(points, axis=0).max())
     if size == 0:
         raise ValueError("the points coincide, so they have no hull")

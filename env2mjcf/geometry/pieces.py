@@ -14,6 +14,11 @@ SLENDEREST = 5e-6
 """Least width of a piece in units of its length: MuJoCo keeps mesh vertices as float32 (6e-8), and its qhull refuses
 points that are nearly coplanar."""
 
+LEAST_WIDTH = 1e-7
+"""Least width of a piece in metres: below 5e-15 square metres MuJoCo finds a mesh's surface too small."""
+
+_LEAST_AREA = 2e-14
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexPiece:
@@ -42,7 +47,7 @@ def hull_piece(points: Floats, thickness: float) -> ConvexPiece:
     axes = np.linalg.svd(np.vstack([local - local.mean(axis=0), np.zeros((3, 3))]), full_matrices=False)[2]
     spread = np.ptp(local @ axes.T, axis=0)
     for axis, width in zip(axes, spread, strict=True):
-        least = min(thickness, SLENDEREST * float(spread.max()))
+        least = float(_least_width(spread.max(), thickness))
         if width < least:
             reach = (thickness if width < least / 1000 else least) - width
             local = np.concatenate([local + axis * (reach / 2), local - axis * (reach / 2)])
@@ -60,7 +65,7 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
 
     Returns:
         Prisms in the order of the polygons. One of a polygon too narrow for MuJoCo is widened, by less than
-        `thickness`.
+        `thickness`; one that is still too small is left out.
     """
     loops = _corner_loops(vertices, polygons)
     out: list[ConvexPiece | None] = [None] * len(polygons)
@@ -74,13 +79,14 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         points = (local[:, None] + shift[:, :, None]).reshape(len(members), -1, 3)
         points.setflags(write=False)
         centers.setflags(write=False)
-        narrow = _too_narrow(local, normals, thickness)
+        narrow, surfaces = _too_narrow(local, normals, thickness), _surfaces(local, thickness)
         for row, i in enumerate(members):
             if narrow[row]:
                 rectangle = _widened(local[row], normals[row], thickness)
-                whole = np.concatenate([rectangle + shift[row, 0], rectangle + shift[row, 1]])
-                out[i] = _frozen(whole, centers[row], polygons[i])
-            else:
+                if _surfaces(rectangle[None], thickness)[0] >= _LEAST_AREA:
+                    whole = np.concatenate([rectangle + shift[row, 0], rectangle + shift[row, 1]])
+                    out[i] = _frozen(whole, centers[row], polygons[i])
+            elif surfaces[row] >= _LEAST_AREA:
                 out[i] = ConvexPiece(points[row], centers[row], polygons[i])
     return tuple(piece for piece in out if piece is not None)
 
@@ -121,8 +127,15 @@ def _height(start: Floats, point: Floats, end: Floats) -> Floats:
     return np.divide(area, length, out=np.zeros_like(area), where=length > 0)
 
 
-def _least_width(length: Floats, thickness: float) -> Floats:
-    return np.minimum(thickness, SLENDEREST * np.maximum(length, thickness))
+def _least_width(length: Floats | float, thickness: float) -> Floats:
+    return np.minimum(thickness, np.maximum(SLENDEREST * np.maximum(length, thickness), LEAST_WIDTH))
+
+
+def _surfaces(local: Floats, thickness: float) -> Floats:
+    """Return the areas, (g,), of prisms on polygons (g, k, 3)."""
+    following = np.roll(local, -1, axis=1)
+    base = np.linalg.norm(np.cross(local, following).sum(axis=1), axis=1) / 2
+    return 2 * base + thickness * np.linalg.norm(following - local, axis=2).sum(axis=1)
 
 
 def _across(local: Floats, normals: Floats) -> Floats:

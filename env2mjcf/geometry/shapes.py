@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import DiagnosticLog, Span
+from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
 from .convexity import is_convex
@@ -15,7 +15,7 @@ from .hull import hull_volume
 from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, prisms
 from .polygons import convex_polygons
-from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints
+from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 
@@ -32,6 +32,7 @@ class CollisionShape:
             the caller must test that separately.
         analysis: The mesh's analysis.
         note: One sentence for the report.
+        omitted_area: Area of polygons that are too small for MuJoCo.
     """
 
     mesh: Mesh
@@ -40,9 +41,10 @@ class CollisionShape:
     needs_containment: bool
     analysis: Analysis
     note: str
+    omitted_area: float = 0.0
 
 
-def collision_shape(  # noqa: PLR0917
+def collision_shape(
     mesh: Mesh,
     analysis: Analysis,
     strategy: Collision,
@@ -63,7 +65,7 @@ def collision_shape(  # noqa: PLR0917
         span: Where the mesh is named in the source.
 
     Raises:
-        GeometryError: The mesh is a point or a line (GEO231).
+        GeometryError: The mesh is a point or a line (GEO231), or too small for MuJoCo (GEO241).
         NotImplementedError: The strategy is "solid" or "coacd".
         ValueError: The thickness is not positive, or the strategy is unknown.
     """
@@ -78,8 +80,17 @@ def collision_shape(  # noqa: PLR0917
     shape = _STRATEGIES[strategy](mesh, analysis, thickness)
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
-        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)  # noqa: PLE1205
+        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
+    if shape.omitted_area:
+        _report_omission(shape, log, subject or mesh.name, span)
     return shape
+
+
+def _report_omission(shape: CollisionShape, log: DiagnosticLog, subject: str, span: Span | None) -> None:
+    message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
+    hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
+    report = log.warn if shape.pieces else log.fail
+    report(GeometryError, "GEO241", subject, message, hint=hint, span=span)
 
 
 def _hull(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
@@ -101,14 +112,30 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
 
 
 def _surface(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
-    pieces, note = _prisms(analysis, analysis.faces, thickness)
-    return CollisionShape(mesh, "surface", pieces, False, analysis, note)
+    return _with_prisms(mesh, analysis, analysis.faces, thickness)
 
 
-def _prisms(analysis: Analysis, faces: Ints, thickness: float) -> tuple[tuple[ConvexPiece, ...], str]:
+def _with_prisms(
+    mesh: Mesh, analysis: Analysis, faces: Ints, thickness: float, hulls: tuple[ConvexPiece, ...] = ()
+) -> CollisionShape:
     polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
-    return pieces, f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
+    made = {id(piece.polygon) for piece in pieces}
+    lost = [face for polygon in polygons if id(polygon) not in made for face in polygon.faces]
+    note = f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
+    return CollisionShape(
+        mesh=mesh,
+        strategy="surface",
+        pieces=hulls + pieces,
+        needs_containment=False,
+        analysis=analysis,
+        note=f"{_hulled(hulls)}, {note}" if hulls else note,
+        omitted_area=float(face_areas(analysis.vertices, faces[lost]).sum()) if lost else 0.0,
+    )
+
+
+def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
+    return f"{_count(len(hulls), 'convex part')} as {'a hull' if len(hulls) == 1 else 'hulls'}"
 
 
 def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
@@ -122,11 +149,9 @@ def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
         for c in np.flatnonzero(whole)
     )
     rest = analysis.faces[~whole[analysis.component]]
-    hulled = f"{_count(len(hulls), 'convex part')} as hulls"
     if len(rest) == 0:
-        return CollisionShape(mesh, "hull", hulls, False, analysis, hulled)
-    pieces, note = _prisms(analysis, rest, thickness)
-    return CollisionShape(mesh, "surface", hulls + pieces, True, analysis, f"{hulled}, {note}" if hulls else note)
+        return CollisionShape(mesh, "hull", hulls, False, analysis, _hulled(hulls))
+    return replace(_with_prisms(mesh, analysis, rest, thickness, hulls), needs_containment=True)
 
 
 def _convex_solids(analysis: Analysis) -> Bools:

@@ -88,7 +88,7 @@ def _visual_file(mesh: Mesh) -> tuple[bytes, str]:
     vertices, faces = _drawable(mesh)
     drawn = trimesh.Trimesh(vertices, faces, process=False)
     if len(faces) > _MAX_STL_FACES:
-        return export_obj(drawn, include_normals=False, include_color=False, header=None, digits=9).encode(), "obj"
+        return export_obj(drawn, include_normals=False, include_color=False, header="", digits=9).encode(), "obj"
     return export_stl(drawn), "stl"
 
 

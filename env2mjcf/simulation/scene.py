@@ -240,6 +240,8 @@ class Scene:
         found: list[Contact] = []
         for a, b, position, normal, distance in self._engine.touching(self.space.qpos(row), self._thread_data()):
             pair = self._pair_of[frozenset((a, b))]
+            if pair.constant:
+                continue
             direction = normal if a == pair.link else -normal
             found.append(Contact(pair.link, pair.other, pair.kind, position, direction, distance))
         return found + list(self._static) + self._contained(row, found)

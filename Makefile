@@ -1,0 +1,58 @@
+# Set-up included: every target installs what it needs into .venv, once, and is quick afterwards.
+# A machine needs make, Python 3.11 or newer and the package index.
+
+PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PYTEST_FLAGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format wheel tables pictures clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 18
+
+demo: $(VENV)/view.stamp  ## convert the seed scene, let it fall, report contacts, draw a picture
+	@$(BIN)/python models/demo.py
+
+test: $(VENV)/dev.stamp  ## run the tests; PYTEST_FLAGS="-k alpha" picks some
+	$(BIN)/python -m pytest -n 2 $(PYTEST_FLAGS)
+
+lint: $(VENV)/dev.stamp  ## ruff, its formatter, pyright
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+
+format: $(VENV)/dev.stamp  ## let ruff format and fix
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+wheel: $(VENV)/dev.stamp  ## build the wheel into dist/
+	$(BIN)/python -m build --wheel --outdir dist .
+
+tables: $(VENV)/dev.stamp  ## make the tables of README.md and benchmarks/corpus.md anew
+	$(BIN)/python benchmarks/table.py
+
+pictures: $(VENV)/dev.stamp  ## draw the pictures in docs/ anew
+	$(BIN)/python models/demo.py --gallery docs/models.png
+
+clean:  ## remove what was built, .venv included
+	rm -rf $(VENV) build dist demo .pytest_cache .ruff_cache .hypothesis
+
+# A stamp is written last, so that an interrupted installation is taken up again.
+$(VENV)/view.stamp: pyproject.toml
+	$(call install,view)
+	@touch $@
+
+$(VENV)/dev.stamp: pyproject.toml
+	$(call install,dev)
+	@touch $(VENV)/view.stamp $@
+
+define install
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed: none of python3.11, python3 is" >&2; exit 1; }
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
+	@echo "installing env2mjcf[$(1)] into $(VENV), once" >&2
+	@$(PIP) install --editable '.[$(1)]'
+endef

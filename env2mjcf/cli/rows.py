@@ -1,0 +1,140 @@
+"""One or many rows of numbers as configurations, whatever they stand in."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiagnosticLog, FormatError
+from ..formats.query import split_row
+from ..formats.source import Source, read_source
+from ..options import Limits
+from ..simulation.scene import Scene
+from ..transforms import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Configurations:
+    """Rows to be checked.
+
+    Attributes:
+        q: (n, dim) radians and metres.
+        labels: What each row is called in reports.
+    """
+
+    q: Array
+    labels: tuple[str, ...]
+
+
+def joined(scene: Scene, rows: Sequence[tuple[str, Array]]) -> Configurations:
+    """Put labelled rows together."""
+    q = np.array([row for _, row in rows], dtype=np.float64).reshape(-1, scene.space.dim)
+    return Configurations(q, tuple(label for label, _ in rows))
+
+
+def row_of(scene: Scene, numbers: Sequence[float], radians: bool) -> Array | None:
+    """Return the configuration that some numbers mean: a full row of all robots first, else one robot's."""
+    space = scene.space
+    if len(numbers) == space.dim:
+        return np.array(numbers) if radians else space.decode(numbers)
+    taken = split_row(numbers, [s.stop - s.start for s in space.robot_slices])
+    if taken is None:
+        return None
+    robot, values = taken
+    columns = space.robot_slices[robot]
+    given = np.zeros(space.dim)
+    given[columns] = values
+    q = space.home.copy()
+    q[columns] = (given if radians else space.decode(given))[columns]
+    return q
+
+
+def expected(scene: Scene) -> str:
+    """Say which rows would have been right."""
+    space = scene.space
+    if not space.dim:
+        return "none: the scene has no robot that moves"
+    names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
+    dofs = [s.stop - s.start for s in space.robot_slices]
+    if len(dofs) == 1:
+        return f"{space.dim} ({names})"
+    each = ", ".join(f"{d} for robot {i}" for i, d in enumerate(dofs))
+    return f"{space.dim} for all robots ({names}), or a robot index and {each}"
+
+
+def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: DiagnosticLog) -> Configurations:
+    """Read a NumPy file of rows.
+
+    Raises:
+        FormatError: It is none, or a row fits no robot.
+    """
+    if not os.path.isfile(path) or os.path.getsize(path) > limits.file_bytes:
+        read_source(path, log, limits)  # says what is wrong
+    try:
+        array: Any = np.load(path, allow_pickle=False)
+        rows = np.atleast_2d(np.asarray(array, dtype=np.float64))
+    except (OSError, ValueError, TypeError, EOFError, MemoryError):
+        log.fail(FormatError, "CFG505", path, f"{path} is no NumPy file with an array of numbers")
+    if rows.ndim != 2 or not np.isfinite(rows).all():
+        what = f"an array of shape {array.shape}" if rows.ndim != 2 else "numbers that are not finite"
+        log.fail(FormatError, "CFG505", path, f"{path} holds {what}; expected finite rows of {expected(scene)}")
+    if rows.shape[1] == scene.space.dim:
+        q = rows if radians else scene.space.decode(rows)
+        return Configurations(q, tuple(f"row {i}" for i in range(len(rows))))
+    found: list[tuple[str, Array]] = []
+    for i, numbers in enumerate(rows.tolist()):
+        row = row_of(scene, numbers, radians)
+        if row is None:
+            log.fail(FormatError, "CFG504", path, f"row {i} has {len(numbers)} numbers; expected {expected(scene)}")
+        found.append((f"row {i}", row))
+    return joined(scene, found)
+
+
+def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> Configurations:
+    """Read a text of rows, numbers between commas or blanks; a first line without numbers names columns.
+
+    Raises:
+        FormatError: A word is no finite number, or a row fits no robot.
+    """
+    found: list[tuple[str, Array]] = []
+    lines = enumerate(re.split(r"\r\n?|\n", source.text), 1)
+    rows = ((line, _words(content)) for line, content in lines)
+    for n, (line, words) in enumerate((line, words) for line, words in rows if words):
+        numbers = [_number(w) for w in words]
+        if n == 0 and all(x is None for x in numbers):
+            continue  # names of columns
+        wrong = next((w for w, x in zip(words, numbers, strict=True) if x is None or not np.isfinite(x)), None)
+        if wrong is not None:
+            log.fail(
+                FormatError, "CFG502", source.path, f"expected a row of finite numbers, found {wrong!r}",
+                span=source.line_span(line, wrong),
+            )  # fmt: skip
+        row = row_of(scene, [x for x in numbers if x is not None], radians)
+        if row is None:
+            log.fail(
+                FormatError, "CFG504", source.path, f"a row of {len(words)} numbers; expected {expected(scene)}",
+                span=source.line_span(line),
+            )  # fmt: skip
+        found.append((f"line {line}", row))
+    if not found:
+        log.fail(
+            FormatError, "CFG503", source.path, f"{source.path} holds no configuration; expected rows of numbers",
+            span=source.line_span(1),
+        )  # fmt: skip
+    return joined(scene, found)
+
+
+def _words(line: str) -> list[str]:
+    return [w for w in re.split(r"[,;\s]+", line.split("#", maxsplit=1)[0]) if w]
+
+
+def _number(word: str) -> float | None:
+    try:
+        return float(word)
+    except ValueError:
+        return None

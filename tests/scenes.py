@@ -1,0 +1,35 @@
+"""Tiny scenes that tests write for themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+MODELS = Path(__file__).parent.parent / "models"
+
+CUBE_FACES = (
+    "1 3 -2\n1 4 -3\n5 6 -7\n5 7 -8\n1 2 -6\n1 6 -5\n2 3 -7\n2 7 -6\n3 4 -8\n3 8 -7\n4 1 -5\n4 5 -8\n"
+)
+
+
+def box_mesh(x: float, y: float, z: float) -> str:
+    """Return a BYU box of these half sizes about the origin, faces outwards."""
+    corners = [(-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (-x, -y, z), (x, -y, z), (x, y, z), (-x, y, z)]
+    lines = "\n".join(" ".join(repr(float(c)) for c in corner) for corner in corners)
+    return f"1 8 12 36\n1 12\n{lines}\n{CUBE_FACES}"
+
+
+def write_scene(folder: Path, text: str, name: str = "scene.env", **meshes: str) -> Path:
+    """Write an env file and its meshes (`cube=...` becomes cube.g); a unit cube is always there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for stem, content in {"cube": box_mesh(0.5, 0.5, 0.5), **meshes}.items():
+        (folder / f"{stem}.g").write_text(content)
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def free_cube(*obstacles: str, boundary: str = "Boundary Box [-10:10 ; -10:10 ; -10:10]", robot: str = "") -> str:
+    """Return a dialect D scene of one cube robot and cubes at poses `x y z rx ry rz`."""
+    passive = "".join(f"\nPassive\n{o if '.g' in o else 'cube.g ' + o}\n" for o in obstacles)
+    active = robot or "1\ncube.g Volumetric Rotational\nConnections\n0\n"
+    return f"{boundary}\n\nMultibodies\n{1 + len(obstacles)}\n\nActive\n{active}{passive}"

@@ -1,0 +1,149 @@
+"""What `convert` writes, and what it leaves behind when it cannot."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+from scenes import MODELS, box_mesh, free_cube, write_scene
+
+import env2mjcf
+
+SEED = MODELS / "seed/seed.env"
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_a_folder_holds_all_that_the_model_needs(tmp_path: Path) -> None:
+    result = env2mjcf.convert(SEED, tmp_path / "out")
+    assert result.xml == tmp_path / "out/seed.xml"
+    assert set(files(tmp_path / "out")) == {
+        "seed.xml", *(str(p.relative_to(tmp_path / "out")) for p in result.assets)
+    }  # fmt: skip
+    moved = tmp_path / "elsewhere"
+    (tmp_path / "out").rename(moved)
+    assert mujoco.MjModel.from_xml_path(str(moved / "seed.xml")).nbody == 5
+
+
+def test_a_file_name_may_be_given_instead_of_a_folder(tmp_path: Path) -> None:
+    result = env2mjcf.convert(SEED, tmp_path / "deep/er/robot.xml")
+    assert result.xml == tmp_path / "deep/er/robot.xml"
+    assert mujoco.MjModel.from_xml_path(str(result.xml)).nbody == 5
+
+
+def test_only_what_the_last_scene_named_is_removed(tmp_path: Path) -> None:
+    path = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
+    out = tmp_path / "out"
+    first = env2mjcf.convert(path, out)
+    (out / "assets/mine.stl").write_text("not yours")
+    (out / "assets/cube-0123456789ab.stl").write_text("not yours either")
+    (out / "notes.txt").write_text("hello")
+    write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"), cube=box_mesh(0.4, 0.4, 0.4))
+    second = env2mjcf.convert(path, out)
+    assert not set(first.assets) & set(second.assets)
+    assert not any(p.exists() for p in first.assets)
+    assert all(p.exists() for p in second.assets)
+    assert (out / "assets/mine.stl").read_text() == "not yours"
+    assert (out / "assets/cube-0123456789ab.stl").exists()
+    assert (out / "notes.txt").exists()
+
+
+def test_two_scenes_share_a_folder(tmp_path: Path) -> None:
+    env2mjcf.convert(SEED, tmp_path)
+    env2mjcf.convert(MODELS / "alpha/alpha.env", tmp_path)
+    for name in ("seed", "alpha"):
+        mujoco.MjModel.from_xml_path(str(tmp_path / f"{name}.xml"))
+
+
+def test_a_refused_scene_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
+    out = tmp_path / "out"
+    env2mjcf.convert(path, out)
+    before = files(out)
+    write_scene(tmp_path / "in", free_cube("6 0 0 0 0 0"), cube=box_mesh(0.3, 0.3, 0.3))
+
+    def refuse(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(env2mjcf.conversion, "load_file", refuse)
+    with pytest.raises(KeyboardInterrupt):
+        env2mjcf.convert(path, out)
+    assert files(out) == before
+
+
+def test_a_truncated_asset_is_written_again(tmp_path: Path) -> None:
+    result = env2mjcf.convert(SEED, tmp_path)
+    whole = files(tmp_path)
+    result.assets[0].write_bytes(b"")
+    env2mjcf.convert(SEED, tmp_path)
+    assert files(tmp_path) == whole
+
+
+def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("I am a file")
+    with pytest.raises(env2mjcf.ConversionError, match="expected a folder") as caught:
+        env2mjcf.convert(SEED, tmp_path / "out")
+    assert caught.value.code == "MJC421"
+    assert (tmp_path / "out").read_text() == "I am a file"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
+def test_a_folder_that_may_not_be_written_is_named(tmp_path: Path) -> None:
+    """In a child without privileges, since root may write everywhere."""
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o555)
+    for folder in (tmp_path, *tmp_path.parents):
+        if folder.stat().st_uid == os.getuid() and folder != Path("/"):
+            folder.chmod(folder.stat().st_mode | 0o055)
+    scene = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
+    read_end, write_end = os.pipe()
+    child = os.fork()
+    if child == 0:
+        if os.getuid() == 0:
+            os.setuid(65534)
+        try:
+            env2mjcf.convert(scene, closed / "out")
+            answer = "no error"
+        except env2mjcf.ConversionError as error:
+            answer = f"{error.code} {error}"
+        os.write(write_end, answer.encode())
+        os._exit(0)
+    os.close(write_end)
+    os.waitpid(child, 0)
+    answer = os.read(read_end, 10_000).decode()
+    assert answer.startswith("MJC420")
+    assert "may not be written" in answer
+    assert str(closed) in answer
+    assert list(closed.iterdir()) == []
+
+
+def test_options_are_checked_before_anything_is_done(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="did you mean 'collision'"):
+        env2mjcf.convert(SEED, tmp_path / "out", colision="hull")
+    with pytest.raises(ValueError, match="'hul'.*did you mean 'hull'"):
+        env2mjcf.convert(SEED, tmp_path / "out", collision="hul")
+    with pytest.raises(ValueError, match="positive"):
+        env2mjcf.load(SEED, scale=-1)
+    with pytest.raises(ValueError, match="dialect A only"):
+        env2mjcf.load(MODELS / "alpha/alpha.env", semantics="page")
+    assert not (tmp_path / "out").exists()
+
+
+def test_strict_turns_a_warning_into_an_error(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, free_cube("5 0 0 0 0 0").rstrip())
+    assert "ENV210" in {d.code for d in env2mjcf.load(path).diagnostics}
+    with pytest.raises(env2mjcf.FormatError) as caught:
+        env2mjcf.load(path, strict=True)
+    assert caught.value.code == "ENV210"
+
+
+def test_reading_does_not_import_mujoco(tmp_path: Path) -> None:
+    import subprocess
+
+    code = f"import sys, env2mjcf; env2mjcf.read({os.fspath(SEED)!r}); sys.exit('mujoco' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
