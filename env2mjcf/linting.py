@@ -77,7 +77,10 @@ def lint(
     Raises:
         ValueError, NotImplementedError: An option has a value that it cannot take.
     """
-    chosen = dataclasses.replace(options or Options(), strict=False)
+    given = options or Options()
+    chosen = Options.from_keywords(
+        {f.name: getattr(given, f.name) for f in dataclasses.fields(given)} | {"strict": False}
+    )
     files = _files(paths)
     results: list[LintResult] = []
     seen: set[Diagnostic] = set()

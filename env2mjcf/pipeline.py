@@ -17,6 +17,7 @@ from .names import dof_names
 from .options import Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
 from .space import ConfigurationSpace
+from .transforms import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,17 +72,20 @@ def recompile(compiled: Compiled, exclude: Sequence[tuple[str, str]], log: Diagn
 
 def configuration_space(assembly: Assembly, options: Options) -> ConfigurationSpace:
     """Build the configuration space of an assembled scene."""
-    space = ConfigurationSpace(
+    return ConfigurationSpace(
         [r.kinematics for r in assembly.robots],
         [n for r in assembly.robots for n in dof_names(r.names, r.kinematics.dofs)],
         [r.home for r in assembly.robots],
         assembly.environment.boundary,
         options.scale,
+        _sample_box(assembly),
     )
+
+
+def _sample_box(assembly: Assembly) -> tuple[Array, Array]:
+    """Return the obstacles' box grown by the greatest robot radius; twice that radius without obstacles."""
     radius = max((r.radius for r in assembly.robots), default=0.0)
-    if assembly.obstacles:
-        corners = np.concatenate([p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles])
-        space.set_sample_box(corners.min(axis=0) - radius, corners.max(axis=0) + radius)
-    else:
-        space.set_sample_box(np.full(3, -2 * radius), np.full(3, 2 * radius))
-    return space
+    if not assembly.obstacles:
+        return np.full(3, -2 * radius), np.full(3, 2 * radius)
+    corners = np.concatenate([p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles])
+    return corners.min(axis=0) - radius, corners.max(axis=0) + radius

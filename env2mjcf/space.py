@@ -39,6 +39,14 @@ class Slot:
 class ConfigurationSpace:
     """Limits, units and topology of a scene's degrees of freedom.
 
+    Args:
+        robots: All robots.
+        names: One name for each degree of freedom.
+        homes: The home configuration of each robot.
+        boundary: In metres; a base keeps within it.
+        scale: Metres per file unit.
+        sample_box: Corners of the box that degrees of freedom without limits are drawn from.
+
     Attributes:
         names: One name for each degree of freedom.
         robot_slices: The columns of each robot.
@@ -54,6 +62,7 @@ class ConfigurationSpace:
         homes: Sequence[Array],
         boundary: Boundary | None,
         scale: float,
+        sample_box: tuple[Array, Array],
     ) -> None:
         self.names = tuple(names)
         stops = np.cumsum([0, *(r.dim for r in robots)])
@@ -77,7 +86,7 @@ class ConfigurationSpace:
         self._is_length = np.array([d.kind.is_length for d in dofs], dtype=bool)
         self._bound_bases(boundary)
         self._slots, self.nq = _layout(robots, self.robot_slices)
-        self._sample_box: tuple[Array, Array] = (np.full(3, -1.0), np.full(3, 1.0))
+        self._sample_box = sample_box
         for array in (self.lower, self.upper, self.periodic, self.home, self._units):
             array.setflags(write=False)
 
@@ -202,10 +211,6 @@ class ConfigurationSpace:
         values = self._last_axis(q, "q")
         inside = (values >= self.lower) & (values <= self.upper)
         return np.all(inside | self.periodic, axis=-1)
-
-    def set_sample_box(self, lower: Array, upper: Array) -> None:
-        """Set the box that unbounded degrees of freedom are drawn from."""
-        self._sample_box = (lower, upper)
 
     def _bound_bases(self, boundary: Boundary | None) -> None:
         """A base stays within the boundary, as its vertices do."""

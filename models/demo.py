@@ -1,7 +1,6 @@
-"""The seed scene in MuJoCo, from the env file to a contact report and a picture: `make demo`.
+"""The seed scene in MuJoCo, from the env file to a contact report and a picture: what `make demo` runs.
 
-    python models/demo.py [--out FOLDER] [--picture FILE]
-    python models/demo.py --gallery docs/models.png      the README's picture: every scene of this folder
+`python models/demo.py --gallery docs/models.png` draws the picture of the README instead: every scene of this folder.
 """
 
 from __future__ import annotations
@@ -37,7 +36,8 @@ GALLERY: tuple[tuple[str, dict[str, str], str, float], ...] = (
     ("maze/maze.xml", {}, "start", 1.3),
     ("xml-arm/xml-arm.xml", {}, "start", 1.25),
 )
-COLUMNS, TILE, CAPTION = 3, (400, 300), 26
+# In pixels, but for the first.
+COLUMNS, TILE, CAPTION, MARGIN = 3, (400, 300), 26, 4
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -142,8 +142,9 @@ def gallery(picture: Path) -> None:
         for i, (scene, files, pose, zoom) in enumerate(GALLERY):
             options = {name: HERE / file for name, file in files.items()}
             result = env2mjcf.convert(HERE / scene, Path(folder) / str(i), ground=True, **options)
-            tile = offscreen.render(result.xml, Path(folder) / f"{i}.png", pose, size=(width - 8, height - 8), zoom=zoom)
-            left, top = i % COLUMNS * width + 4, i // COLUMNS * (height + CAPTION) + 4
+            size = (width - 2 * MARGIN, height - 2 * MARGIN)
+            tile = offscreen.render(result.xml, Path(folder) / f"{i}.png", pose, size=size, zoom=zoom)
+            left, top = i % COLUMNS * width + MARGIN, i // COLUMNS * (height + CAPTION) + MARGIN
             with Image.open(tile) as image:
                 sheet.paste(image.convert("RGB"), (left, top))
             caption = f"{Path(scene).parent.name}, dialect {result.report.dialect}"

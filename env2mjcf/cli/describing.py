@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..dialects import RULES
 from ..kinematics import RobotKinematics
 from ..model import Boundary, Dialect, Environment, Resolution, scaled
@@ -120,6 +122,7 @@ def _robots(environment: Environment, metres: float) -> list[RobotSummary]:
         [k.home() for k in kinematics],
         in_metres.boundary,
         metres,
+        sample_box=(np.zeros(3), np.zeros(3)),  # nothing is drawn, and the obstacles' box needs their meshes
     )
     lower, upper, home = (space.encode(v) for v in (space.lower, space.upper, space.home))
     summaries: list[RobotSummary] = []

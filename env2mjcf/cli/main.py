@@ -64,6 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _BROKEN_PIPE
     except KeyboardInterrupt:
         return _INTERRUPTED
+    except Exception as error:
+        return _fault(error)
     return status
 
 
@@ -73,9 +75,7 @@ def _dispatch(words: list[str]) -> int:
         print(_HELP, end="")
         return DONE
     if name == "--version":
-        from .. import __version__
-
-        print(__version__)
+        print(_version())
         return DONE
     if name not in VERBS:
         guess = did_you_mean(name, VERBS)
@@ -90,33 +90,47 @@ def _dispatch(words: list[str]) -> int:
     return _run(name, verb)
 
 
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError
+
+    try:
+        from .. import __version__
+    except PackageNotFoundError:
+        return "a checkout that is not installed"
+    return __version__
+
+
 def _run(name: str, verb: Verb) -> int:
     try:
         return verb.run()
-    except BrokenPipeError:
-        raise
-    except Exception as error:
-        if verb.output.debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
-            traceback.print_exc()
-        return _explain(name, verb, error)
-
-
-def _explain(name: str, verb: Verb, error: Exception) -> int:
-    """Say what went wrong, and return the exit status for it."""
-    if isinstance(error, Env2MjcfError):
+    except Env2MjcfError as error:
+        _show_traceback(verb.output.debug)
         print_diagnostics(error.diagnostics, verb.output.verbose)
         if verb.output.json:
             print_json({"error": error.diagnostic, "diagnostics": error.diagnostics})
         return BAD_INPUT
-    if isinstance(error, ValueError | NotImplementedError):
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
+        if type(error) not in (ValueError, NotImplementedError):
+            return _fault(error, verb.output.debug)
+        _show_traceback(verb.output.debug)
         _complain(f"{name}: {error}")
         return WRONG_USAGE
+
+
+def _fault(error: Exception, debug: bool = False) -> int:
+    """Report what should not have happened."""
+    _show_traceback(debug)
     notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
-    _complain(
-        f"{name}: a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} "
-        "(--debug shows where it happened)"
-    )
+    _complain(f"a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} (--debug shows where)")
     return FAULT
+
+
+def _show_traceback(debug: bool) -> None:
+    if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
+        traceback.print_exc()
 
 
 def _complain(message: str) -> None:

@@ -10,6 +10,9 @@ from .topology import Floats, Ints, edges
 
 _PARALLEL = 1.0 - 1e-12
 
+# How far reflex a corner may be, in units of the tolerance: rounding only, since many in a row add up.
+_STRAIGHT = 1e-3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygon:
@@ -35,7 +38,7 @@ def convex_polygons(vertices: Floats, faces: Ints, tolerance: float) -> tuple[Po
     Args:
         vertices: (n, 3).
         faces: (m, 3) without degenerate ones.
-        tolerance: Length by which a merged vertex may be off the plane, or a corner reflex.
+        tolerance: Length by which a merged vertex may be off the plane.
 
     Returns:
         Polygons in the order of their first triangles.
@@ -127,11 +130,9 @@ class _Merger:
         before, at, after = (self._points[loop[k % len(loop)]] for k in (i - 1, i, i + 1))
         u, v = _minus(at, before), _minus(after, at)
         turn = _dot(normal, _cross(u, v))
-        chord = _dot(_minus(after, before), _minus(after, before)) ** 0.5
-        if turn > self._tolerance * chord:
-            return True
-        # The height of the corner over the chord says how far a reflex one is from straight.
-        return turn >= -self._tolerance * chord and _dot(u, v) > 0
+        # The height of the corner over the chord says how far it is from straight.
+        straight = _STRAIGHT * self._tolerance * _dot(_minus(after, before), _minus(after, before)) ** 0.5
+        return turn > straight or (turn >= -straight and _dot(u, v) > 0)
 
 
 def _joined(left: list[int], right: list[int], a: int, b: int) -> tuple[list[int], int] | None:

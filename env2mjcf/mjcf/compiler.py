@@ -17,6 +17,7 @@ from .bodies import Compilation, add_obstacles, add_robot
 from .contacts import add_contacts, excluded_obstacles
 from .keyframes import add_keyframes
 from .loops import add_loops
+from .reporting import report_unused
 from .scenery import add_ground_material, add_scenery, add_settings
 from .writer import add, comment_text, to_text
 
@@ -60,6 +61,7 @@ def compile_mjcf(
     add_loops(root, compilation, log)
     if options.actuators == "position":
         add_actuators(root, compilation, log)
+    report_unused(environment, log)
     add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(

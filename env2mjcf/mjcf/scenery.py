@@ -61,6 +61,8 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     # Thin cells have no volume to speak of; all masses are explicit.
     add(default, "mesh", inertia="shell")
     add(default, "geom", solref=f"{number(contact)} 1")
+    # Stiff enough that a loop stays within a ten-thousandth of its size.
+    add(default, "equality", solref=f"{number(contact)} 1", solimp="0.99 0.9999 0.001")
     drawn = add(default, "default", class_="visual")
     add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
     collision = add(default, "default", class_="collision")

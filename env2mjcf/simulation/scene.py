@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -15,14 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.batch import in_chunks
-from ..contact.boundary import BoundaryTest
-from ..contact.containment import Containment
-from ..contact.engine import MujocoEngine
 from ..contact.paths import EdgeSteps, check_path
-from ..contact.static_pairs import static_contacts
+from ..contact.queries import ContactQueries
 from ..contact.types import Contact, PathReport
 from ..errors import Diagnostic
-from ..geometry.assembly import Part
 from ..model import Environment
 from ..options import Engine
 from ..pipeline import Compiled
@@ -67,26 +63,10 @@ class Scene:
         self.environment: Environment = compiled.environment
         self.diagnostics: tuple[Diagnostic, ...] = compiled.diagnostics
         self._compiled = compiled
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Build what is not pickled: everything that follows from the model and the compiled scene."""
-        compiled, model = self._compiled, self.model
-        assembly, document = compiled.assembly, compiled.document
+        self._queries = ContactQueries(compiled, model)
+        self._steps = EdgeSteps(compiled.assembly, self.space)
         self._data: mujoco.MjData | None = None
         self._lock = threading.Lock()
-        self._scratch = threading.local()
-        self._engine = MujocoEngine(model, document.owners)
-        self._links = [p for r in assembly.robots for p in r.links]
-        self._bodies = np.array([model.body(p.name).id for p in self._links], dtype=np.int64)
-        self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
-        self._pair_of = {frozenset((p.link, p.other)): p for p in compiled.pairs.tested}
-        self._boundary = BoundaryTest(assembly.environment.boundary, self._links)
-        self._containment = Containment(compiled.pairs.tested, self._parts)
-        self._steps = EdgeSteps(assembly, self.space)
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        self._static = static_contacts(model, data, compiled.pairs.tested, document.owners)
 
     # What the scene is.
 
@@ -124,7 +104,7 @@ class Scene:
     @property
     def link_names(self) -> tuple[str, ...]:
         """All robot bodies, in file order."""
-        return tuple(p.name for p in self._links)
+        return tuple(p.name for p in self._queries.links)
 
     @property
     def obstacle_names(self) -> tuple[str, ...]:
@@ -173,7 +153,7 @@ class Scene:
     def link_poses(self, q: ArrayLike) -> Array:
         """Return the world poses of all robot bodies out of MuJoCo's kinematics, (..., nlinks, 4, 4)."""
         rows = self.space.check(q)
-        poses = self._link_poses(np.atleast_2d(rows))
+        poses = self._queries.link_poses(np.atleast_2d(rows))
         return poses if rows.ndim == 2 else poses[0]
 
     def obstacle_poses(self) -> Array:
@@ -216,7 +196,7 @@ class Scene:
             NotImplementedError: The engine or the executor is not available yet.
         """
         _only_available(engine or "auto", executor)
-        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._collisions, threads, progress))
+        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._queries.collisions, threads, progress))
 
     def is_valid(
         self,
@@ -232,19 +212,11 @@ class Scene:
         Arguments, result and errors are those of `in_collision`.
         """
         _only_available(engine or "auto", executor)
-        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._validities, threads, progress))
+        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._queries.validities, threads, progress))
 
     def contacts(self, q: ArrayLike) -> list[Contact]:
         """Return every contact of one configuration, pairs that cannot move included."""
-        row = self._row(q)
-        found: list[Contact] = []
-        for a, b, position, normal, distance in self._engine.touching(self.space.qpos(row), self._thread_data()):
-            pair = self._pair_of[frozenset((a, b))]
-            if pair.constant:
-                continue
-            direction = normal if a == pair.link else -normal
-            found.append(Contact(pair.link, pair.other, pair.kind, position, direction, distance))
-        return found + list(self._static) + self._contained(row, found)
+        return self._queries.contacts(self._row(q))
 
     def clearance(self, q: ArrayLike) -> float | Array:
         """Not available yet: exact clearance needs the triangle engine.
@@ -273,9 +245,9 @@ class Scene:
         if start.shape != end.shape:
             raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
         if start.ndim == 1:
-            return bool(self._collisions(self._steps.rows(start, end, resolution)).any())
+            return bool(self._queries.collisions(self._steps.rows(start, end, resolution)).any())
         edges = (self._steps.rows(a, b, resolution) for a, b in zip(start, end, strict=True))
-        return np.array([self._collisions(rows).any() for rows in edges], dtype=bool)
+        return np.array([self._queries.collisions(rows).any() for rows in edges], dtype=bool)
 
     def edge_is_free(self, q0: ArrayLike, q1: ArrayLike) -> Any:
         """Not available yet: a certified edge needs exact clearance.
@@ -297,7 +269,7 @@ class Scene:
         Raises:
             ValueError: The path has a wrong shape, or the resolution is not positive.
         """
-        return check_path(path, self._steps, self._validities, self.contacts, self.space, resolution)
+        return check_path(path, self._steps, self._queries.validities, self.contacts, self.space, resolution)
 
     # Pickling: the model and the compiled scene travel, the rest is built again.
 
@@ -313,8 +285,9 @@ class Scene:
     def __repr__(self) -> str:
         robots = len(self._compiled.assembly.robots)
         return (
-            f"<Scene {self.environment.name!r}: {robots} robot{'' if robots == 1 else 's'}, {len(self._links)} links, "
-            f"{self.space.dim} degrees of freedom, {len(self.obstacle_names)} obstacles>"
+            f"<Scene {self.environment.name!r}: {robots} robot{'' if robots == 1 else 's'}, "
+            f"{len(self._queries.links)} links, {self.space.dim} degrees of freedom, "
+            f"{len(self.obstacle_names)} obstacles>"
         )
 
     def _row(self, q: ArrayLike) -> Array:
@@ -328,63 +301,12 @@ class Scene:
         answers = answer(np.atleast_2d(rows) if rows.ndim == 1 else rows)
         return answers if rows.ndim == 2 else answers[0].item()
 
-    def _thread_data(self) -> mujoco.MjData:
-        data = getattr(self._scratch, "data", None)
-        if data is None:
-            data = self._scratch.data = self._engine.data()
-        return data
-
-    def _link_poses(self, rows: Array) -> Array:
-        return self._engine.body_poses(self.space.qpos(rows), self._bodies, self._thread_data())
-
     def _loop_errors(self, rows: Array) -> Array:
         worst = np.zeros(len(rows))
         for robot, columns in zip(self._compiled.assembly.robots, self.space.robot_slices, strict=True):
             gaps = robot.kinematics.loop_gaps(rows[:, columns], [p.radius for p in robot.links])
             worst = np.maximum(worst, gaps.max(axis=-1, initial=0.0))
         return worst
-
-    def _collisions(self, rows: Array) -> NDArray[np.bool_]:
-        if self._static:
-            return np.ones(len(rows), dtype=bool)
-        hits = self._engine.collide(self.space.qpos(rows), self._thread_data())
-        free = ~hits
-        if self._containment.needed and free.any():
-            hits[free] = self._containment.inside(self._poses_by_name(rows[free]))
-        return hits
-
-    def _validities(self, rows: Array) -> NDArray[np.bool_]:
-        valid = self.space.within_limits(rows)
-        if valid.any():
-            valid[valid] = self._boundary.inside(self._link_poses(rows[valid]))
-        if valid.any():
-            valid[valid] = ~self._collisions(rows[valid])
-        return valid
-
-    def _poses_by_name(self, rows: Array) -> dict[str, Array]:
-        poses = self._link_poses(rows)
-        by_name = {p.name: poses[:, i] for i, p in enumerate(self._links)}
-        for part in self._compiled.assembly.obstacles:
-            by_name[part.name] = np.broadcast_to(part.pose, (len(rows), 4, 4))
-        return by_name
-
-    def _contained(self, row: Array, touching: Sequence[Contact]) -> list[Contact]:
-        """Return contacts of bodies that lie wholly inside others; their normals point along the bodies' centres."""
-        if not self._containment.needed:
-            return []
-        poses = self._poses_by_name(row[None])
-        seen = {(c.link, c.other) for c in touching}
-        found: list[Contact] = []
-        for index, point in self._containment.pairs_inside(poses):
-            pair = self._compiled.pairs.tested[index]
-            if (pair.link, pair.other) in seen:
-                continue
-            apart = poses[pair.other][0, :3, 3] - poses[pair.link][0, :3, 3]
-            length = float(np.linalg.norm(apart))
-            normal = apart / length if length else np.array([0.0, 0.0, 1.0])
-            depth = -min(self._parts[pair.link].mesh.diagonal, self._parts[pair.other].mesh.diagonal)
-            found.append(Contact(pair.link, pair.other, pair.kind, point, normal, depth))
-        return found
 
 
 def _only_available(engine: str, executor: Executor | None) -> None:
