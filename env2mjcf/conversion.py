@@ -89,14 +89,19 @@ def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[P
         os.replace(staged, final)
     except BaseException:
         staged.unlink(missing_ok=True)
-        for path in made:
-            if path.name not in before:
-                path.unlink(missing_ok=True)
+        _remove(folder, {p.name for p in made})
         raise
     written = tuple(folder / relative for relative in document.assets)
-    for old in before - {p.name for p in written}:
-        (folder / "assets" / old).unlink(missing_ok=True)
+    _remove(folder, before - {p.name for p in written})
     return written
+
+
+def _remove(folder: Path, names: set[str]) -> None:
+    """Remove assets that no scene of the folder names."""
+    for scene in folder.glob("*.xml"):
+        names = names - _named_assets(scene)
+    for name in names:
+        (folder / "assets" / name).unlink(missing_ok=True)
 
 
 def _write_beside(path: Path, data: bytes) -> None:

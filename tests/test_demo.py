@@ -155,9 +155,7 @@ def test_a_picture_leaves_this_process_without_gl(seed_xml: Path, tmp_path: Path
         f"offscreen.render({str(seed_xml)!r}, 'a.png', size=(64, 48))\n"
         "print(*sorted({m.partition('.')[0] for m in sys.modules} & {'mujoco', 'OpenGL', 'glfw'}))\n"
     )
-    finished = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert finished.stdout.strip() == ""
     assert pixels(tmp_path / "a.png").shape == (48, 64, 3)
 

@@ -18,7 +18,7 @@ from .contacts import add_contacts, excluded_obstacles
 from .keyframes import add_keyframes
 from .loops import add_loops
 from .reporting import report_unused
-from .scenery import add_ground_material, add_scenery, add_settings
+from .scenery import add_ground_material, add_scenery, add_settings, add_sky
 from .writer import add, comment_text, to_text
 
 
@@ -49,6 +49,7 @@ def compile_mjcf(
     root = etree.Element("mujoco", model=environment.name)
     add_settings(root, assembly, options)
     asset = add(root, "asset")
+    add_sky(asset)
     world = add(root, "worldbody")
     add_scenery(world, assembly, options)
     add_obstacles(world, compilation)

@@ -56,7 +56,9 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     visual = add(root, "visual")
     add(visual, "global", offwidth="1280", offheight="960")
     add(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.4 0.4 0.4", specular="0 0 0")
-    add(visual, "map", znear="0.001", zfar="20")
+    # The whole scene within the shadow's range, at a resolution that shows no stripes.
+    add(visual, "quality", shadowsize="8192")
+    add(visual, "map", znear="0.001", zfar="20", shadowclip="2")
     default = add(root, "default")
     # Thin cells have no volume to speak of; all masses are explicit.
     add(default, "mesh", inertia="shell")
@@ -67,6 +69,14 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
     collision = add(default, "default", class_="collision")
     add(collision, "geom", type="mesh", group="3", contype="1", conaffinity="3", mass="0", rgba="0.9 0.5 0.2 0.4")
+
+
+def add_sky(asset: Element) -> None:
+    """Append the sky behind the scene."""
+    add(
+        asset, "texture", name="sky", type="skybox", builtin="gradient", rgb1="0.93 0.95 0.97", rgb2="0.72 0.80 0.88",
+        width="256", height="1536",
+    )  # fmt: skip
 
 
 def add_ground_material(asset: Element) -> None:

@@ -72,7 +72,8 @@ def _report_touching(compiled: Compiled, link: str, other: str, contact: Contact
         # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
         log.info(
             "KIN312", link, f"{link} and {other} touch at home, where the base is at the origin",
-            hint="simulate from a query's start: key 'start'", span=body.span,
+            hint="" if compiled.environment.tasks else "give a query: simulations can begin at its start",
+            span=body.span,
         )  # fmt: skip
         return
     log.warn(

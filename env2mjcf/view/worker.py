@@ -37,7 +37,8 @@ def draw(request: dict[str, Any]) -> None:
     from PIL import Image
 
     width, height = request["size"]
-    model = _dressed(request["xml"], width * _OVERSAMPLING, height * _OVERSAMPLING)
+    model = mujoco.MjModel.from_xml_path(request["xml"])
+    model.vis.global_.offwidth, model.vis.global_.offheight = width * _OVERSAMPLING, height * _OVERSAMPLING
     camera = model.camera(request["camera"]).id
     half = np.tan(np.radians(model.cam_fovy[camera]) / 2) / request["zoom"]
     model.cam_fovy[camera] = np.degrees(2 * np.arctan(half))
@@ -50,27 +51,9 @@ def draw(request: dict[str, Any]) -> None:
     pixels = renderer.render()
     picture = Image.fromarray(pixels).resize((width, height), Image.Resampling.LANCZOS)
     # 256 colours are enough for shaded solids, and a third of the size.
-    picture.quantize(256, kmeans=1, dither=Image.Dither.FLOYDSTEINBERG).save(request["picture"], format="PNG", optimize=True)
-
-
-def _dressed(xml: str, width: int, height: int) -> mujoco.MjModel:
-    """Load a model with a sky, and with shadows that are fine enough for a large ground."""
-    spec = mujoco.MjSpec.from_file(xml)
-    if not any(t.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for t in spec.textures):
-        spec.add_texture(
-            name="env2mjcf:sky",
-            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-            builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-            rgb1=(0.97, 0.98, 0.99),
-            rgb2=(0.78, 0.84, 0.90),
-            width=256,
-            height=1536,
-        )
-    model = spec.compile()
-    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-    model.vis.quality.shadowsize = max(model.vis.quality.shadowsize, 8192)
-    model.vis.map.shadowclip = max(model.vis.map.shadowclip, 2.0)
-    return model
+    picture.quantize(256, kmeans=1, dither=Image.Dither.FLOYDSTEINBERG).save(
+        request["picture"], format="PNG", optimize=True
+    )
 
 
 def _poses(model: mujoco.MjModel, pose: Any) -> list[NDArray[np.float64]]:

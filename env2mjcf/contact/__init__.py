@@ -1,0 +1,1 @@
+"""Contact queries: one configuration or many, along an edge, along a path."""

@@ -1,0 +1,1 @@
+"""Meshes: found, loaded, analysed, turned into convex cells and inertias."""

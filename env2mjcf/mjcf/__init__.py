@@ -1,0 +1,1 @@
+"""An assembled scene in, MJCF text and asset files out."""
