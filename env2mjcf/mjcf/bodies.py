@@ -15,7 +15,7 @@ from ..transforms import Array, inverse, quaternion_from_matrix
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
 from .joints import add_base_joints, add_connection_joints
-from .writer import Element, add, numbers
+from .writer import Element, add, numbers, tidy
 
 
 @dataclass(slots=True)
@@ -103,7 +103,7 @@ def _add_geoms(
 
 def _add_inertial(element: Element, inertial: Inertial) -> None:
     add(
-        element, "inertial", pos=numbers(inertial.com), quat=numbers(inertial.quat), mass=numbers(inertial.mass),
+        element, "inertial", pos=numbers(tidy(inertial.com)), quat=numbers(tidy(inertial.quat)), mass=numbers(inertial.mass),
         diaginertia=numbers(inertial.diagonal),
     )  # fmt: skip
 
@@ -111,9 +111,10 @@ def _add_inertial(element: Element, inertial: Inertial) -> None:
 def _place(pose: Array) -> dict[str, str]:
     """Return pos and quat, each left out where it is the default."""
     place: dict[str, str] = {}
-    if np.any(pose[:3, 3] != 0):
-        place["pos"] = numbers(pose[:3, 3])
-    quaternion = quaternion_from_matrix(pose[:3, :3])
+    position = tidy(pose[:3, 3])
+    if np.any(position != 0):
+        place["pos"] = numbers(position)
+    quaternion = tidy(quaternion_from_matrix(pose[:3, :3]))
     if np.any(quaternion != (1, 0, 0, 0)):
         place["quat"] = numbers(quaternion)
     return place

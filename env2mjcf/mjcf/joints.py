@@ -10,7 +10,7 @@ from ..geometry.assembly import RobotParts
 from ..model import BaseKind
 from ..space import joint_kinds
 from ..transforms import inverse
-from .writer import Element, add, number, numbers
+from .writer import Element, add, number, numbers, tidy
 
 _BASE_AXES = {
     DofKind.X: ("slide", "1 0 0"),
@@ -51,8 +51,8 @@ def add_connection_joints(element: Element, robot: RobotParts, body: int, names:
             "joint",
             name=names[column],
             type="slide" if kind is DofKind.D else "hinge",
-            pos=numbers(frame[:3, 3]),
-            axis=numbers(axis),
+            pos=numbers(tidy(frame[:3, 3])),
+            axis=numbers(tidy(axis)),
             range=_range(dof),
             ref=number(robot.home[column]) if robot.home[column] else None,
         )

@@ -10,7 +10,7 @@ from ..geometry.assembly import RobotParts
 from ..model import JointType
 from ..transforms import Array, inverse, quaternion_from_matrix
 from .bodies import Compilation
-from .writer import Element, add, numbers
+from .writer import Element, add, numbers, tidy
 
 # A loop counts as closed at home below this fraction of the scene's extent.
 _CLOSED = 1e-6
@@ -43,8 +43,8 @@ def _add_loop(
     def sites(suffix: str, offset: Array, turned: bool) -> tuple[str, str]:
         names = f"{name}:{suffix}a", f"{name}:{suffix}b"
         for site, part, frame in zip(names, (previous, following), (here, there), strict=True):
-            place = frame[:3, :3] @ offset + frame[:3, 3]
-            quat = numbers(quaternion_from_matrix(frame[:3, :3])) if turned else None
+            place = tidy(frame[:3, :3] @ offset + frame[:3, 3])
+            quat = numbers(tidy(quaternion_from_matrix(frame[:3, :3]))) if turned else None
             add(compilation.elements[part.name], "site", name=site, pos=numbers(place), quat=quat, group="5")
         return names
 

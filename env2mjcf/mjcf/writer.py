@@ -9,6 +9,8 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from ..transforms import Array
+
 Element = Any  # lxml's classes have no public names
 
 
@@ -23,6 +25,12 @@ def numbers(values: ArrayLike) -> str:
     return " ".join(number(v) for v in np.asarray(values, dtype=np.float64).reshape(-1))
 
 
+def tidy(values: ArrayLike) -> Array:
+    """Return values with rounding noise set to zero: what is below 1e-15 of one, or of the largest of them."""
+    array = np.asarray(values, dtype=np.float64)
+    return np.where(np.abs(array) < 1e-15 * max(1.0, float(np.max(np.abs(array), initial=0.0))), 0.0, array)
+
+
 def add(parent: Element, tag: str, **attributes: str | None) -> Element:
     """Append an element; attributes that are None are left out, a trailing `_` of a name is dropped (`class_`)."""
     element = etree.SubElement(parent, tag)
@@ -34,13 +42,15 @@ def add(parent: Element, tag: str, **attributes: str | None) -> Element:
 
 def comment(parent: Element, lines: Iterable[str]) -> None:
     """Append a comment."""
-    parent.append(etree.Comment(comment_text(lines)))
+    parent.append(etree.Comment(comment_text(lines, "  ")))
 
 
-def comment_text(lines: Iterable[str]) -> str:
+def comment_text(lines: Iterable[str], indent: str = "") -> str:
     """Return the text of a comment; `--` and control characters cannot stand in one."""
     lines = ["".join(c if c.isprintable() else "?" for c in line).replace("--", "- -") for line in lines]
-    return f" {lines[0]} " if len(lines) == 1 else "\n" + "\n".join(f"    {line}".rstrip() for line in lines) + "\n"
+    if len(lines) == 1:
+        return f" {lines[0]} "
+    return "\n" + "".join(f"{indent}  {line}\n" for line in lines) + indent
 
 
 def to_text(root: Element) -> str:
