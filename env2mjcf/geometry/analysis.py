@@ -30,7 +30,7 @@ class Analysis:
         normal: (3,) unit normal of the plane that the points are nearest to.
         closed: Each edge borders an even number of triangles, and the surface is not flat.
         consistent: In the file each edge is walked equally often both ways, as far as it has two faces.
-        oriented: The same for `faces`: those of a closed mesh are turned round to agree, where that is possible.
+        oriented: The same for `faces`, which are turned round to agree, where that is possible.
         inverted: Closed and consistent, and wound inside out in the file, at least in part.
         convex: Closed, one component, and the boundary of its own hull.
         box: The box that it is, if it is convex and exactly that.
@@ -101,7 +101,7 @@ def analyse(mesh: Mesh) -> Analysis:
     clean = cleaned(points, np.searchsorted(used, mesh.faces), tolerance, dimension)
     faces, table = clean.faces, clean.edges
     consistent = oriented = wound_alike(table)
-    if clean.closed and not consistent:
+    if not consistent:
         faces, oriented = rewound(faces)
 
     component = face_components(edges(faces))

@@ -103,8 +103,8 @@ def _add_geoms(
 
 def _add_inertial(element: Element, inertial: Inertial) -> None:
     add(
-        element, "inertial", pos=numbers(tidy(inertial.com)), quat=numbers(tidy(inertial.quat)), mass=numbers(inertial.mass),
-        diaginertia=numbers(inertial.diagonal),
+        element, "inertial", pos=numbers(tidy(inertial.com)), quat=numbers(tidy(inertial.quat)),
+        mass=numbers(inertial.mass), diaginertia=numbers(inertial.diagonal),
     )  # fmt: skip
 
 
