@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -80,16 +78,6 @@ def rotation(seed: int) -> Floats:
     """A random rotation matrix."""
     q = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     return q * np.sign(np.linalg.det(q))
-
-
-def cpu_seconds(call: Callable[[], object]) -> float:
-    """Processor time of the quickest of three calls: other work on the machine must not fail a test."""
-    times: list[float] = []
-    for _ in range(3):
-        start = time.process_time()
-        call()
-        times.append(time.process_time() - start)
-    return min(times)
 
 
 def corpus_meshes(corpus: Path) -> list[Mesh]:
