@@ -32,8 +32,9 @@ format: $(VENV)/dev.stamp  ## let ruff format and fix
 wheel: $(VENV)/dev.stamp  ## build the wheel into dist/
 	$(BIN)/python -m build --wheel --outdir dist .
 
-tables: $(VENV)/dev.stamp  ## make the tables of README.md and benchmarks/corpus.md anew
+tables: $(VENV)/dev.stamp  ## make the tables of README.md, benchmarks/ and docs/ anew
 	$(BIN)/python benchmarks/table.py
+	$(BIN)/python docs/diagnostics.py
 
 pictures: $(VENV)/dev.stamp  ## draw the pictures in docs/ anew
 	$(BIN)/python models/demo.py --gallery docs/models.png

@@ -117,8 +117,9 @@ def degrees_of_freedom(multibody: MultiBody, tree: Tree) -> tuple[Dof, ...]:
         for body in sorted(tree.bases)
         for kind in _BASE_DOFS[tree.bases[body]]
     ]
+    loops = frozenset(tree.loops)
     for k in _joint_order(multibody, tree, rules.joint_order):
-        dofs += _joint_dofs(multibody.connections[k], k, k in tree.loops, rules.hinges_are_periodic)
+        dofs += _joint_dofs(multibody.connections[k], k, k in loops, rules.hinges_are_periodic)
     return tuple(dofs)
 
 
@@ -152,7 +153,8 @@ def _order(
     for body in order:  # grows while it is walked
         order += children.get(body, [])
     if len(order) < len(multibody.bodies):
-        lost = next(i for i in range(len(multibody.bodies)) if i not in set(order))
+        reached = set(order)
+        lost = next(i for i in range(len(multibody.bodies)) if i not in reached)
         body = multibody.bodies[lost]
         log.fail(
             KinematicsError, "KIN303", body.filename,

@@ -344,10 +344,8 @@ class Environment:
     @property
     def obstacles(self) -> tuple[MultiBody, ...]:
         """Everything that is neither a robot nor a Surface."""
-        robots = self.robots
-        return tuple(
-            m for m in self.multibodies if m.kind is not MultiBodyKind.SURFACE and not any(m is r for r in robots)
-        )
+        robots = {id(r) for r in self.robots}
+        return tuple(m for m in self.multibodies if m.kind is not MultiBodyKind.SURFACE and id(m) not in robots)
 
     @property
     def surfaces(self) -> tuple[MultiBody, ...]:
@@ -380,8 +378,12 @@ def scaled(environment: Environment, factor: float) -> Environment:
 
 
 def _scaled_multibody(multibody: MultiBody, factor: float) -> MultiBody:
+    bounds = multibody.velocity_bounds
+    if bounds is not None:
+        bounds = dataclasses.replace(bounds, linear=bounds.linear * factor)
     return dataclasses.replace(
         multibody,
+        velocity_bounds=bounds,
         bodies=tuple(
             b if b.pose is None else dataclasses.replace(b, pose=_scaled_pose(b.pose, factor)) for b in multibody.bodies
         ),
@@ -393,8 +395,12 @@ def _scaled_connection(connection: Connection, factor: float) -> Connection:
     limits = connection.limits
     if connection.joint is JointType.PRISMATIC:
         limits = tuple(dataclasses.replace(x, lower=x.lower * factor, upper=x.upper * factor) for x in limits)
+    sma = connection.sma
+    if sma is not None:
+        sma = SMAShape(sma.length * factor, sma.width * factor)
     return dataclasses.replace(
         connection,
+        sma=sma,
         to_dh=_scaled_pose(connection.to_dh, factor),
         dh=dataclasses.replace(connection.dh, a=connection.dh.a * factor, d=connection.dh.d * factor),
         to_body=_scaled_pose(connection.to_body, factor),

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from texts import read, read_robot  # noqa: F401  fixtures
 
 _FOLDER = os.environ.get("ENV2MJCF_CORPUS")
 CORPUS: Path | None = Path(_FOLDER) if _FOLDER else None

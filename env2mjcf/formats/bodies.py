@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from ..model import BaseKind, Body, Dialect, Pose, Recentring
+from ..model import BaseKind, Body, Pose, Recentring
 from .blocks import Grammar, read_color, read_pose, with_directives
-from .lexer import Scanner, Token
+from .lexer import Scanner, Token, misspelling
 
 _BASES = {"Planar": "Planar", "Volumetric": "Volumetric", "Fixed": "Fixed", "Joint": "Joint"}
 _MOVEMENTS = {"Rotational": "Rotational", "Translational": "Translational"}
@@ -44,8 +44,8 @@ def read_surface_body(scan: Scanner, grammar: Grammar) -> tuple[str | None, Body
 def _with_pose(scan: Scanner, grammar: Grammar, filename: Token) -> Body:
     comments = scan.take_directives()
     body = _read_mesh(scan, grammar, filename)
-    # In E an obstacle may say `Fixed` before its pose (env-format section 8.1).
-    if grammar.dialect is Dialect.E and scan.peek().isalpha():
+    # Dialect E lets an obstacle say `Fixed` before its pose (env-format section 8.1).
+    if misspelling(scan.peek_word(), _BASES) is not None:
         start = scan.position
         base, pose = _read_base(scan, grammar)
         if base is not BaseKind.FIXED:

@@ -14,6 +14,7 @@ _COUNT = re.compile(r"[0-9]+")
 # Every tag is at most this long, so that a longer word need not be compared with them.
 _LONGEST_TAG = 16
 _TAG_LIKE = re.compile(rf"(?<!\S)[AaNnSs][A-Za-z]{{3,{_LONGEST_TAG}}}(?!\S)")
+_OPTION = re.compile(r"-[A-Za-z]\([^)\r\n]*\)")
 _BOUNDARY = re.compile(r"\s*\S+\s+(?:[A-Za-z]\w*\s*)?(\[)?")
 _LIMITS = re.compile(r"\b(revolute|spherical)\s+[^\s:]+:", re.IGNORECASE)
 _ROBOT_TAGS = ("Active", "NonHolonomic", "Surface")
@@ -91,9 +92,11 @@ def _with_boundary(text: str) -> Dialect:
     match = _BOUNDARY.match(text)
     if match and not match.group(1):
         return Dialect.C
-    return Dialect.D if any(map(_is_robot_tag, set(_TAG_LIKE.findall(text)))) else Dialect.E
+    # `-a( Surface )` is no tag.
+    words = set(_TAG_LIKE.findall(_OPTION.sub("", text)))
+    return Dialect.D if any(map(_is_robot_tag, words)) else Dialect.E
 
 
 def _is_robot_tag(word: str) -> bool:
-    # `-a( Surface )` and the like are no tags; a misspelt tag is one, which keeps its dialect's kinematics.
+    # A misspelt tag counts, so that its robot keeps the kinematics of its dialect.
     return misspelling(word, _LATER_TAGS) in _ROBOT_TAGS

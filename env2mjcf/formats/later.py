@@ -6,16 +6,9 @@ from dataclasses import replace
 
 from ..errors import FormatError
 from ..model import Body, Dialect, MultiBody, MultiBodyKind, VelocityBounds
-from .blocks import (
-    Grammar,
-    check_count,
-    check_limit,
-    is_multibody_tag,
-    read_body_index,
-    read_connections,
-    read_counted,
-)
+from .blocks import Grammar, check_count, check_limit, is_multibody_tag, read_counted
 from .bodies import read_robot_body, read_static_body, read_surface_body
+from .connections import read_body_index, read_connections
 from .lexer import Scanner, misspelling
 
 _KINDS = {k.value: k for k in MultiBodyKind}
@@ -102,7 +95,8 @@ def _with_controls(scan: Scanner, multibody: MultiBody) -> MultiBody:
     widths = sorted({len(c) for c in controls})
     if len(widths) > 1:
         scan.log.warn(
-            FormatError, "ENV217", "Controls", f"controls of {widths[0]} to {widths[-1]} numbers; expected equally many",
+            FormatError, "ENV217", "Controls",
+            f"controls of {widths[0]} to {widths[-1]} numbers; expected equally many",
             hint="blank lines and comments count as controls", span=span,
         )  # fmt: skip
     return replace(multibody, velocity_bounds=VelocityBounds(linear, angular), controls=controls)
@@ -113,6 +107,11 @@ def _read_control(scan: Scanner, what: str) -> tuple[float, ...]:
     if scan.behind_last_line():
         scan.fail_expected(what)
     line = scan.line()
+    if scan.behind_last_line() and not scan.source.text.endswith(("\n", "\r")):
+        scan.log.warn(
+            FormatError, "ENV210", scan.source.path, f"no newline behind {what}: is it cut off?",
+            hint="end the last line with a newline, if nothing is missing", span=line.span(),
+        )  # fmt: skip
     values: list[float] = []
     while not line.at_end():
         values.append(line.number(what))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ..errors import did_you_mean
 from ..model import BaseKind, Body, MultiBody, MultiBodyKind
-from .blocks import Grammar, check_count, check_limit, read_connections, read_pose, with_directives
+from .blocks import Grammar, check_count, check_limit, read_pose, with_directives
+from .connections import read_connections
 from .lexer import Scanner
 
 # `Internal` and `Surface` are in no grammar of this dialect, but in real files.
@@ -65,10 +66,8 @@ def _read_body(scan: Scanner, grammar: Grammar, *, first: bool) -> Body:
             "ENV301", filename.text, "only the first FreeBody of a robot has a pose; this one is not used",
             span=pose.span,
         )  # fmt: skip
-    if not free:
-        base = BaseKind.FIXED
-    else:
-        base = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
+    free_base = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     span = scan.source.span(filename.start, filename.end)
+    base = free_base if free else BaseKind.FIXED
     body = Body(filename.text, base, pose, grammar.rules.recentring, index=index, span=span)
     return with_directives(scan, body, comments)

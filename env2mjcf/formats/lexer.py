@@ -23,7 +23,7 @@ _NUMBER = re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?{_E
 _INTEGER = re.compile(rf"[+-]?[0-9]+{_END}")
 _WORD = re.compile(r"[^\s;\[\]]+")
 _CHUNK = re.compile(r"\S+")
-_BLANK = re.compile(r"\s*")
+_BLANK = re.compile(r"\s+")
 _REST_OF_LINE = re.compile(r"([^\r\n]*)(?:\r\n|\n|\r)?")
 _COMMENT = re.compile(r"#[^\r\n]*")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|[0-9.]+#(INF|IND|QNAN|SNAN))", re.IGNORECASE)
@@ -45,7 +45,8 @@ def number_hint(word: str) -> str:
         return "write a decimal point, not a comma"
     if _HEXADECIMAL.match(word):
         return "write a decimal number; hexadecimal ones are not read"
-    return "numbers must be finite" if _NOT_FINITE.match(word) or _NUMBER.fullmatch(word) else ""
+    overflows = _NUMBER.fullmatch(word) and math.isinf(float(word))
+    return "numbers must be finite" if overflows or _NOT_FINITE.match(word) else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,18 +257,18 @@ class Scanner:
 
     def _skip(self) -> None:
         text, end = self.source.text, self._end
-        while True:
-            blank = _BLANK.match(text, self._position, end)
-            if blank:
-                self._position = blank.end()
-            if self._position >= end or text[self._position] != "#":
+        while self._position < end:
+            char = text[self._position]
+            pattern = _COMMENT if char == "#" else _BLANK
+            if char != "#" and not char.isspace():
                 return
-            comment = _COMMENT.match(text, self._position, end)
-            assert comment is not None
-            kept = Comment(comment.group(), self.source.span(comment.start(), comment.end()))
-            self.comments.append(kept)
-            self._directives.append(kept)
-            self._position = comment.end()
+            match = pattern.match(text, self._position, end)
+            assert match is not None
+            self._position = match.end()
+            if char == "#":
+                kept = Comment(match.group(), self.source.span(match.start(), match.end()))
+                self.comments.append(kept)
+                self._directives.append(kept)
 
 
 def misspelling(word: str, known: Iterable[str]) -> str | None:

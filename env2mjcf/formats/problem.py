@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import FormatError
+from ..errors import FormatError, did_you_mean
 from ..model import Boundary, BoundaryShape, PlannerRules
+from .lexer import Scanner
 from .xml import Node
 
 _TRUE = {"true": True, "1": True, "false": False, "0": False}
+# What several ages of the planner call the same number.
+_ADJACENT_LINKS = ("ignoreIAdjacentLinks", "ignore_i_adjacent_links")
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemRobot:
+    """A `<Robot>`: its label and the file that describes it."""
+
+    label: str
+    filename: str
+    node: Node
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +40,15 @@ class Problem:
     Attributes:
         environment: The node that names, or is, the environment.
         filename: The environment file it names; None where the environment stands inside.
-        robots: (label, file name, node) of each robot.
-        tasks: In file order.
+        robots: In file order, without virtual ones.
+        tasks: In file order, without those of virtual robots.
         rules: What it says about collision pairs.
         boundary: The boundary that older files hold instead of the environment.
     """
 
     environment: Node
     filename: str | None
-    robots: tuple[tuple[str, str, Node], ...]
+    robots: tuple[ProblemRobot, ...]
     tasks: tuple[ProblemTask, ...]
     rules: PlannerRules
     boundary: Boundary | None
@@ -48,70 +60,104 @@ def read_problem(root: Node) -> Problem:
     Raises:
         FormatError: It names no environment, or a task names no robot of it.
     """
-    problems = list(root.descendants("Problem", "MPProblem"))
-    where = problems[0] if problems else root
-    environments = list(where.children("Environment"))
-    if not environments:
-        where.fail("ENV148", f"<{where.tag}> names no <Environment>")
-    environment = environments[0]
-    robots = tuple(
-        (r.get("label") or "", r.require("filename"), r)
-        for r in where.children("Robot")
-        if (r.get("virtual") or "false").lower() != "true"
-    )
-    tasks = tuple(_read_task(t) for t in where.descendants("Task"))
-    labels = [label for label, _, _ in robots]
-    for task in tasks:
-        if task.robot not in labels:
-            task.node.fail("ENV149", f"task {task.label!r} is for the unknown robot {task.robot!r}", at="robot")
+    where = _only_first(root, [root] if _is_problem(root) else list(root.descendants("Problem", "MPProblem")))
+    environment = _only_first(where, list(where.children("Environment")))
+    robots, virtual = _read_robots(where)
     return Problem(
         environment,
         environment.get("filename") or environment.get("input_env"),
         robots,
-        tasks,
+        _read_tasks(where, robots, virtual),
         _read_rules(root),
         _read_older_boundary(environment),
     )
 
 
-def _read_task(node: Node) -> ProblemTask:
+def _is_problem(node: Node) -> bool:
+    return node.tag.lower() in ("problem", "mpproblem")
+
+
+def _only_first(parent: Node, found: list[Node]) -> Node:
+    """Return the first of some nodes; say so where there are more."""
+    if not found:
+        wanted = "Environment" if _is_problem(parent) else "Problem"
+        parent.fail("ENV148", f"<{parent.tag}> has no <{wanted}>, which is expected", hint=f"add a <{wanted}>")
+    for other in found[1:]:
+        other.ignore(f"another <{other.tag}> is not used")
+    return found[0]
+
+
+def _read_robots(problem: Node) -> tuple[tuple[ProblemRobot, ...], set[str]]:
+    """Return the robots, and the labels of the virtual ones, which have no body."""
+    robots: dict[str, ProblemRobot] = {}
+    virtual: set[str] = set()
+    for node in problem.children("Robot"):
+        label = node.get("label") or ""
+        if _flag(node, "virtual"):
+            node.ignore(f"the virtual robot {label!r} is not used")
+            virtual.add(label)
+            continue
+        if label in robots:
+            node.fail(
+                "ENV151", f"two robots are called {label!r}; expected a label of its own for each",
+                hint="tasks name robots by their labels", at="label",
+            )  # fmt: skip
+        robots[label] = ProblemRobot(label, node.require("filename"), node)
+    return tuple(robots.values()), virtual
+
+
+def _read_tasks(problem: Node, robots: tuple[ProblemRobot, ...], virtual: set[str]) -> tuple[ProblemTask, ...]:
+    labels = [r.label for r in robots]
+    tasks: list[ProblemTask] = []
+    for node in problem.descendants("Task"):
+        robot = node.get("robot") or ""
+        if robot in virtual:
+            node.ignore(f"the task of the virtual robot {robot!r} is not used")
+        elif robot in labels:
+            tasks.append(_read_task(node, robot))
+        else:
+            known = ", ".join(repr(label) for label in labels) or "none"
+            node.fail(
+                "ENV149",
+                f"task {node.get('label') or ''!r} is for the unknown robot {robot!r}; expected one of: {known}",
+                hint=did_you_mean(robot, labels) or "name a robot of this file", at="robot",
+            )  # fmt: skip
+    return tuple(tasks)
+
+
+def _read_task(node: Node, robot: str) -> ProblemTask:
     rows: list[tuple[float, ...]] = []
     for block in (*node.children("StartConstraints"), *node.children("GoalConstraints")):
         for constraint in block.children("CSpaceConstraint"):
             if constraint.get("point") is None:
-                node.log.info(
-                    "ENV307", "<CSpaceConstraint>", "a constraint without a point is not used", span=constraint.span
-                )
-                continue
-            scan = constraint.scan("point")
-            row: list[float] = []
-            while not scan.at_end():
-                row.append(scan.number("point"))
-            rows.append(tuple(row))
+                constraint.ignore("a constraint without a point is not used")
+            else:
+                rows.append(constraint.read("point", _numbers))
         block.ignore_other_children("CSpaceConstraint")
-    return ProblemTask(node.get("label") or "", node.get("robot") or "", tuple(rows), node)
+    return ProblemTask(node.get("label") or "", robot, tuple(rows), node)
+
+
+def _numbers(scan: Scanner) -> tuple[float, ...]:
+    numbers: list[float] = []
+    while not scan.at_end():
+        numbers.append(scan.number("point"))
+    return tuple(numbers)
 
 
 def _read_rules(root: Node) -> PlannerRules:
     """Read what the collision checkers say about pairs; where several differ, an explicit `true` wins."""
     checkers = list(root.descendants("CollisionDetection"))
     self_flags = [v for c in checkers if (v := _flag(c, "ignoreSelfCollision")) is not None]
-    adjacent: list[int] = []
-    for checker in checkers:
-        flag = _flag(checker, "ignoreAdjacentLinks")
-        if flag is not None:
-            adjacent.append(int(flag))
-        if checker.get("ignoreIAdjacentLinks") is not None:
-            adjacent.append(checker.integer("ignoreIAdjacentLinks"))
+    adjacent = [int(v) for c in checkers if (v := _flag(c, "ignoreAdjacentLinks")) is not None]
+    adjacent += [c.integer(name) for c in checkers for name in _ADJACENT_LINKS if c.get(name) is not None]
     rules = PlannerRules(any(self_flags) if self_flags else None, max(adjacent) if adjacent else None)
     if rules != PlannerRules():
-        first = checkers[0]
-        first.log.info(
+        root.log.info(
             "ENV309", "<CollisionDetection>",
             "pairs follow the problem file: "
             f"self-collision {'ignored' if rules.ignore_self_collision else 'tested'}, "
             f"links within {1 if rules.adjacent_links is None else rules.adjacent_links} connections ignored",
-            span=first.span,
+            span=checkers[0].span,
         )  # fmt: skip
     return rules
 
@@ -120,23 +166,35 @@ def _flag(node: Node, name: str) -> bool | None:
     text = node.get(name)
     if text is None:
         return None
-    if text.lower() not in _TRUE:
-        node.log.warn(FormatError, "ENV213", name, f"{name}={text!r}; expected true or false", span=node.span_of(name))
+    if text.strip().lower() not in _TRUE:
+        node.log.warn(
+            FormatError, "ENV213", name, f"{name}={text!r} is not used; expected true or false",
+            hint="write true or false", span=node.span_of(name),
+        )  # fmt: skip
         return None
-    return _TRUE[text.lower()]
+    return _TRUE[text.strip().lower()]
 
 
 def _read_older_boundary(environment: Node) -> Boundary | None:
     """Read `<boundary type="bbox">` with a `<parameter>` an axis, which dialects A and B rely on."""
-    for boundary in environment.descendants("boundary"):
+    for boundary in environment.children("boundary"):
         axes: dict[str, tuple[float, float]] = {}
         for parameter in boundary.children("parameter"):
             label = (parameter.get("Label") or parameter.get("label") or "").lower()
             if label in ("x", "y", "z"):
-                axes[label] = (parameter.number("min"), parameter.number("max"))
+                axes[label] = _axis(parameter)
         if "x" in axes and "y" in axes:
             ranges = [axes[k] for k in "xyz" if k in axes]
             shape = BoundaryShape.BOX if len(ranges) == 3 else BoundaryShape.BOX2D
             return Boundary(shape, tuple(r[0] for r in ranges), tuple(r[1] for r in ranges), span=boundary.span)
     return None
 
+
+def _axis(parameter: Node) -> tuple[float, float]:
+    lower, upper = parameter.number("min"), parameter.number("max")
+    if lower > upper:
+        parameter.fail(
+            "ENV114", f"the boundary {lower:g}:{upper:g} is empty; expected min below max",
+            hint=f"write min='{upper:g}' max='{lower:g}'", at="min",
+        )  # fmt: skip
+    return lower, upper

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from ..dofs import build_tree, degrees_of_freedom
-from ..errors import DiagnosticLog, FormatError, Span
+from ..errors import DiagnosticLog, FormatError
 from ..model import Dialect, Environment, MultiBody, Task
-from ..options import Options, PathArgument
+from ..options import Limits, Options, PathArgument
 from . import xml_scene
 from .detect import detect, is_xml
 from .env import read_env
 from .lexer import Scanner
-from .problem import Problem, ProblemTask, read_problem
-from .query import read_query
+from .problem import Problem, ProblemRobot, ProblemTask, read_problem
+from .query import read_query, split_row
 from .robot import read_robot
 from .source import Source, read_source
 from .xml import Node, parse_xml
@@ -56,24 +56,21 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
             problem = read_problem(root)
             environment = _problem_environment(problem, source, options, log)
         else:
-            environment = _xml_environment(root)
+            environment = _xml_environment(root, options)
     else:
         environment = _text_environment(source, options, log)
-    named = () if problem is None else problem.robots
-    robots = [_labelled(_problem_robot(n, f, source, options, log), label) for label, f, n in named]
-    robots += [_robot_file(os.fspath(name), options, log) for name in options.robots]
-    own = len(environment.robots)
+    robots = [] if problem is None else [_problem_robot(r, source, options, log) for r in problem.robots]
+    first_robot = sum(m.moves for m in environment.multibodies)
+    robots += [_robot_file(read_source(name, log, options.limits), options, log) for name in options.robots]
     environment = dataclasses.replace(environment, multibodies=(*environment.multibodies, *robots))
+    _check_limits(environment, options.limits, log)
     if not environment.robots:
         log.info(
             "ENV310", environment.name, "the scene has no robot",
             hint="give a robot file with robots=[...] (--robots)",
         )  # fmt: skip
-    tasks = _tasks(environment, problem, own, options, log)
-    # A problem lends the scene its own name: several problems may share one environment.
-    return dataclasses.replace(
-        environment, name=Path(source.path).stem, tasks=tasks, path=source.path, diagnostics=tuple(log)
-    )
+    tasks = _tasks(environment, problem, first_robot, options, log)
+    return dataclasses.replace(environment, tasks=tasks, path=source.path, diagnostics=tuple(log))
 
 
 def robot_dofs(environment: Environment, log: DiagnosticLog) -> list[int]:
@@ -83,19 +80,44 @@ def robot_dofs(environment: Environment, log: DiagnosticLog) -> list[int]:
 
 def _text_environment(source: Source, options: Options, log: DiagnosticLog) -> Environment:
     dialect = Dialect(options.dialect) if options.dialect else detect(source, log)
-    if options.semantics == "page" and dialect is not Dialect.A:
-        raise ValueError(f"semantics='page' concerns dialect A only; {source.path} is dialect {dialect}")
+    _check_semantics(source, dialect, options)
     return read_env(Scanner(source, log, options.limits), dialect, options.semantics)
 
 
-def _xml_environment(root: Node) -> Environment:
+def _check_semantics(source: Source, dialect: Dialect, options: Options) -> None:
+    if options.semantics == "page" and dialect is not Dialect.A:
+        raise ValueError(f"semantics='page' concerns dialect A only; {source.path} is dialect {dialect}")
+
+
+def _check_limits(environment: Environment, limits: Limits, log: DiagnosticLog) -> None:
+    """Refuse a scene that is larger than `limits` once its robots are added."""
+    for what, found, at_most in (
+        ("bodies", sum(len(m.bodies) for m in environment.multibodies), limits.bodies),
+        ("connections", sum(len(m.connections) for m in environment.multibodies), limits.connections),
+    ):
+        if found > at_most:
+            log.fail(
+                FormatError, "ENV110", environment.path, f"the scene has {found} {what}; at most {at_most} are read",
+                hint=f"raise limits=Limits({what}=...)",
+            )  # fmt: skip
+
+
+def _xml_environment(root: Node, options: Options) -> Environment:
+    _check_semantics(root.source, Dialect.E, options)
+    if options.dialect not in (None, "E"):
+        raise ValueError(
+            f"{root.source.path} is XML, which is dialect E; it cannot be read as dialect {options.dialect}"
+        )
     if root.tag.lower() == "robot":
         root.fail(
             "ENV131", f"{root.source.path} is a robot file, not an environment",
             hint="read the environment, and give this file as robots=[...] (--robots)",
         )  # fmt: skip
     if root.tag.lower() != "environment":
-        root.fail("ENV130", f"unknown root <{root.tag}>; expected <Environment>, <Robot> or <MotionPlanning>")
+        root.fail(
+            "ENV130", f"unknown root <{root.tag}>; expected <Environment> or <MotionPlanning>",
+            hint="name an environment or a problem file",
+        )  # fmt: skip
     return xml_scene.read_environment(root)
 
 
@@ -104,10 +126,9 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
     if problem.filename is None:
         environment = xml_scene.read_environment(node)
     else:
-        path = _beside(source, problem.filename, node.span, options, log)
-        inner = read_source(path, log, options.limits)
+        inner = _read_beside(source, problem.filename, node, options, log)
         if is_xml(inner):
-            environment = _xml_environment(parse_xml(inner, log, options.limits))
+            environment = _xml_environment(parse_xml(inner, log, options.limits), options)
         else:
             environment = _text_environment(inner, options, log)
         environment = xml_scene.with_environment_attributes(environment, node)
@@ -116,55 +137,60 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
     )
 
 
-def _problem_robot(node: Node, filename: str, source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
-    return _robot_file(_beside(source, filename, node.span_of("filename"), options, log), options, log)
+def _problem_robot(robot: ProblemRobot, source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
+    read = _robot_file(_read_beside(source, robot.filename, robot.node, options, log), options, log)
+    return dataclasses.replace(read, label=robot.label or read.label)
 
 
-def _robot_file(path: str, options: Options, log: DiagnosticLog) -> MultiBody:
-    source = read_source(path, log, options.limits)
+def _robot_file(source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
     if not is_xml(source):
         return read_robot(Scanner(source, log, options.limits))
     root = parse_xml(source, log, options.limits)
     if root.tag.lower() != "robot":
-        root.fail("ENV130", f"unknown root <{root.tag}>; expected <Robot>")
+        root.fail("ENV130", f"unknown root <{root.tag}>; expected <Robot>", hint="name a robot file")
     return xml_scene.read_robot(root)
 
 
-def _labelled(robot: MultiBody, label: str) -> MultiBody:
-    return dataclasses.replace(robot, label=label or robot.label)
-
-
-def _beside(source: Source, name: str, span: Span, options: Options, log: DiagnosticLog) -> str:
-    """Return the path of a file that a problem names, which lies in its folder unless `allow_outside`."""
+def _read_beside(source: Source, name: str, node: Node, options: Options, log: DiagnosticLog) -> Source:
+    """Read a file that a problem names, which lies in its folder unless `allow_outside`."""
+    named_at = node.span_of("filename" if node.get("filename") else "input_env")
     folder = Path(source.path).parent
     path = folder / name
-    if not options.allow_outside and not path.resolve().is_relative_to(folder.resolve()):
+    if not options.allow_outside and "\0" not in name and not _inside(path, folder):
         log.fail(
-            FormatError, "ENV150", name, f"{name} lies outside the folder of {source.path}",
-            hint="allow it with allow_outside=True (--allow-outside)", span=span,
+            FormatError, "ENV150", name, f"{name} lies outside the folder of {source.path}; expected a file in it",
+            hint="allow it with allow_outside=True (--allow-outside)", span=named_at,
         )  # fmt: skip
-    return os.fspath(path)
+    return read_source(path, log, options.limits, named_at)
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
 def _tasks(
-    environment: Environment, problem: Problem | None, own: int, options: Options, log: DiagnosticLog
+    environment: Environment, problem: Problem | None, first_robot: int, options: Options, log: DiagnosticLog
 ) -> tuple[Task, ...]:
     dofs = robot_dofs(environment, log)
     tasks: list[Task] = []
     if problem is not None:
-        labels = [label for label, _, _ in problem.robots]
-        tasks += [_problem_task(t, own + labels.index(t.robot), dofs) for t in problem.tasks]
+        robots = {r.label: first_robot + i for i, r in enumerate(problem.robots)}
+        tasks += [_problem_task(t, robots[t.robot], dofs) for t in problem.tasks]
     if options.query is not None:
         tasks += read_query(read_source(options.query, log, options.limits), dofs, log)
     return tuple(tasks)
 
 
 def _problem_task(task: ProblemTask, robot: int, dofs: list[int]) -> Task:
+    configurations: list[tuple[float, ...]] = []
     for row in task.rows:
-        if len(row) != dofs[robot]:
+        taken = split_row(row, dofs[robot : robot + 1])
+        if taken is None:
             task.node.fail(
                 "CFG504",
                 f"a point of {len(row)} numbers in task {task.label!r}; "
-                f"robot {task.robot!r} has {dofs[robot]} degrees of freedom",
+                f"expected {dofs[robot]}, the degrees of freedom of robot {task.robot!r}",
+                hint="is the task meant for another robot?",
             )
-    return Task(robot, task.rows, task.label, task.node.span)
+        configurations.append(taken[1])
+    return Task(robot, tuple(configurations), task.label, task.node.span)

@@ -33,7 +33,7 @@ class Source:
 
     @classmethod
     def of(cls, path: str, text: str) -> Source:
-        """Index the lines of a text; `\\n`, `\\r\\n` and a lone `\\r` end a line."""
+        """Index the lines of a text; a line feed, a carriage return or both end a line."""
         return cls(path, text, (0, *(m.end() for m in _LINE_END.finditer(text))))
 
     def lines(self) -> Iterator[tuple[int, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from lxml import etree
 
@@ -19,31 +19,49 @@ T = TypeVar("T")
 # lxml keeps only the line where a start tag ends; the n-th start tag of the text is the n-th element.
 _MARKUP = re.compile(
     r"<!--.*?-->|<\?.*?\?>|<!\[CDATA\[.*?\]\]>|<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>"
-    r"|<(?P<tag>[A-Za-z_][\w:.\-]*)(?:[^\"'<>]|\"[^\"]*\"|'[^']*')*>",
+    r"|<(?P<tag>[^\s/>!?\"'=]+)(?:[^\"'<>]|\"[^\"]*\"|'[^']*')*>",
     re.DOTALL,
 )
+_ATTRIBUTE = re.compile(r"([^\s\"'=<>/]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_ENTITY = re.compile(r"<!ENTITY")
+_ENCODING = re.compile(r"^(<\?xml[^>]*?)\s+encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+_PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
+_PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class _Document:
+    """What the nodes of one document share.
+
+    Attributes:
+        source: The file.
+        log: Where findings go.
+        limits: Bounds on hostile input.
+        places: Where the start tag of every element lies in the text.
+    """
+
+    source: Source
+    log: DiagnosticLog
+    limits: Limits
+    places: Mapping[Any, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """An element and the place of its start tag.
-
-    Attributes:
-        element: The parsed element.
-        source: The file.
-        start, end: Where its start tag lies in the text.
-        log: Where findings go.
-        limits: Bounds on hostile input.
-        places: Where the start tag of every element of the document lies.
-    """
+    """An element and the place of its start tag."""
 
     element: Any
-    source: Source
-    start: int
-    end: int
-    log: DiagnosticLog
-    limits: Limits
-    places: Mapping[Any, tuple[int, int]]
+    document: _Document
+
+    @property
+    def source(self) -> Source:
+        """The file."""
+        return self.document.source
+
+    @property
+    def log(self) -> DiagnosticLog:
+        """Where findings go."""
+        return self.document.log
 
     @property
     def tag(self) -> str:
@@ -58,21 +76,27 @@ class Node:
     @property
     def span(self) -> Span:
         """Place of the tag's name."""
-        return self.source.span(self.start, self.start + 1 + len(self.tag))
+        start = self._place[0]
+        return self.source.span(start, start + 1 + len(self.tag))
 
     def children(self, *tags: str) -> Iterator[Node]:
         """Iterate the child elements, of some tags (in any case) or all."""
-        wanted = {t.lower() for t in tags}
-        for child in self.element:
-            if isinstance(child.tag, str) and (not wanted or child.tag.lower() in wanted):
-                yield self._node(child)
+        return self._nodes(self.element, tags)
 
     def descendants(self, *tags: str) -> Iterator[Node]:
         """Iterate all elements below with one of some tags (in any case)."""
-        wanted = {t.lower() for t in tags}
-        for child in self.element.iterdescendants():
-            if isinstance(child.tag, str) and child.tag.lower() in wanted:
-                yield self._node(child)
+        return self._nodes(self.element.iterdescendants(), tags)
+
+    def only_child(self, tag: str, code: str) -> Node:
+        """Return the one child of a tag, or fail where there are none or several."""
+        found = list(self.children(tag))
+        if len(found) != 1:
+            at = found[1] if found else self
+            at.fail(
+                code, f"<{self.tag}> has {len(found)} <{tag}> elements; expected one",
+                hint="remove the others" if found else f"add a <{tag}>",
+            )  # fmt: skip
+        return found[0]
 
     def get(self, name: str) -> str | None:
         """Return an attribute's text."""
@@ -83,8 +107,8 @@ class Node:
         """Return an attribute's text, or fail."""
         value = self.get(name)
         if value is None:
-            guess = did_you_mean(name, self.attributes)
-            self.fail("ENV141", f"<{self.tag}> has no attribute {name!r}", hint=guess)
+            hint = did_you_mean(name, self.attributes) or f'write {name}="..."'
+            self.fail("ENV141", f"<{self.tag}> has no attribute {name!r}, which is expected", hint=hint)
         return value
 
     def span_of(self, name: str) -> Span:
@@ -92,68 +116,78 @@ class Node:
         place = self._value(name)
         return self.source.span(*place) if place else self.span
 
-    def scan(self, name: str) -> Scanner:
-        """Return a scanner over an attribute's value, which knows its place in the file."""
+    def read(self, name: str, read: Callable[[Scanner], T]) -> T:
+        """Read an attribute's whole text with a scanner that knows its place in the file."""
         self.require(name)
-        start, end = self._value(name) or (self.start, self.start)
-        cut = Source.of(self.source.path, self.source.text[:end])
-        scanner = Scanner(cut, self.log, self.limits)
-        scanner.advance(start)
-        return scanner
+        start, end = self._value(name) or (self._place[0], self._place[0])
+        scanner = Scanner(self.source, self.log, self.document.limits, start, end, part=f"value of {name}")
+        value = read(scanner)
+        if not scanner.at_end():
+            scanner.fail("ENV143", f"{name} has more than was expected", hint="remove the rest")
+        return value
 
     def number(self, name: str) -> float:
         """Read an attribute as one number."""
-        return self._whole(name, lambda scan: scan.number(name))
-
-    def numbers(self, name: str, names: str) -> tuple[float, ...]:
-        """Read an attribute as several numbers."""
-        return self._whole(name, lambda scan: scan.numbers(names))
+        return self.read(name, lambda scan: scan.number(name))
 
     def integer(self, name: str) -> int:
         """Read an attribute as an integer."""
-        return self._whole(name, lambda scan: scan.integer(name))
+        return self.read(name, lambda scan: scan.integer(name))
 
     def choice(self, name: str, choices: Mapping[str, T]) -> T:
         """Read an attribute as one of several words, in any case."""
-        text = self.require(name)
+        text = self.require(name).strip()
         folded = {k.lower(): v for k, v in choices.items()}
-        if text.strip().lower() not in folded:
+        if text.lower() not in folded:
             expected = " or ".join(repr(k) for k in choices)
             self.fail(
-                "ENV142", f"unknown {name} {text!r}; expected {expected}", hint=did_you_mean(text, choices), at=name
-            )
-        return folded[text.strip().lower()]
+                "ENV142", f"unknown {name} {text!r}; expected {expected}",
+                hint=did_you_mean(text[:60], choices) or f"write {expected}", at=name,
+            )  # fmt: skip
+        return folded[text.lower()]
 
-    def fail(self, code: str, message: str, *, hint: str = "", at: str | None = None) -> Any:
+    def fail(self, code: str, message: str, *, hint: str = "", at: str | None = None) -> NoReturn:
         """Raise a `FormatError` at the element or at one of its attributes."""
         span = self.span_of(at) if at else self.span
         self.log.fail(FormatError, code, f"<{self.tag}>", message, hint=hint, span=span)
 
     def ignore_other_children(self, *known: str) -> None:
         """Report the child elements that nothing reads."""
+        folded = {k.lower() for k in known}
         for child in self.children():
-            if child.tag.lower() not in {k.lower() for k in known}:
-                self.log.info(
-                    "ENV307", f"<{child.tag}>", f"<{child.tag}> of <{self.tag}> is not used", span=child.span
-                )
+            if child.tag.lower() not in folded:
+                child.ignore(f"<{child.tag}> of <{self.tag}> is not used")
 
-    def _whole(self, name: str, read: Callable[[Scanner], T]) -> T:
-        scanner = self.scan(name)
-        value = read(scanner)
-        if not scanner.at_end():
-            scanner.fail("ENV143", f"{name} has more than was expected")
-        return value
+    def ignore_other_attributes(self, *known: str) -> None:
+        """Report the attributes that nothing reads."""
+        for name in self.attributes:
+            if name not in known:
+                self.log.info(
+                    "ENV311", f"<{self.tag}>", f"attribute {name!r} of <{self.tag}> is not used",
+                    hint=did_you_mean(name, known), span=self.span_of(name),
+                )  # fmt: skip
+
+    def ignore(self, message: str) -> None:
+        """Report that nothing reads this element."""
+        self.log.info("ENV307", f"<{self.tag}>", message, span=self.span)
+
+    @property
+    def _place(self) -> tuple[int, int]:
+        return self.document.places.get(self.element, (0, 0))
 
     def _value(self, name: str) -> tuple[int, int] | None:
-        pattern = re.compile(rf"[\s\"'](?:{re.escape(name)})\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
-        match = pattern.search(self.source.text, self.start, self.end)
-        if not match:
-            return None
-        return match.span(1) if match.group(1) is not None else match.span(2)
+        start, end = self._place
+        for match in _ATTRIBUTE.finditer(self.source.text, start, end):
+            if match.group(1) == name:
+                return match.span(2) if match.group(2) is not None else match.span(3)
+        return None
 
-    def _node(self, element: Any) -> Node:
-        start, end = self.places.get(element, (self.start, self.end))
-        return Node(element, self.source, start, end, self.log, self.limits, self.places)
+    def _nodes(self, elements: Any, tags: tuple[str, ...]) -> Iterator[Node]:
+        wanted = {t.lower() for t in tags}
+        for element in elements:
+            # Comments and processing instructions have no text for a tag.
+            if isinstance(element.tag, str) and (not wanted or element.tag.lower() in wanted):
+                yield Node(element, self.document)
 
 
 def parse_xml(source: Source, log: DiagnosticLog, limits: Limits) -> Node:
@@ -162,55 +196,60 @@ def parse_xml(source: Source, log: DiagnosticLog, limits: Limits) -> Node:
     Raises:
         FormatError: The text is not well-formed, or declares entities.
     """
-    if re.search(r"<!ENTITY", source.text):
-        line = source.text[: source.text.index("<!ENTITY")].count("\n") + 1
+    entity = _ENTITY.search(source.text)
+    if entity:
         log.fail(
-            FormatError, "ENV144", source.path, "XML entity declarations are not read", hint="write the text itself",
-            span=source.line_span(line, "<!ENTITY"),
+            FormatError, "ENV144", source.path, "XML entity declarations are not read; expected plain XML",
+            hint="write the text itself where an entity stands", span=source.span(*entity.span()),
         )  # fmt: skip
-    root = _parse(source, log)
-    tags = [m.span() for m in _MARKUP.finditer(source.text) if m.group("tag")]
-    elements = [e for e in root.iter() if isinstance(e.tag, str)]
+    root, end = _parse(source, log)
+    tags = (m.span() for m in _MARKUP.finditer(source.text, 0, end) if m.group("tag"))
     # lxml elements are proxies: they are equal while one is alive, so the map holds them as keys.
-    places = dict(zip(elements, tags, strict=False))
-    start, end = places.get(root, (0, 0))
-    return Node(root, source, start, end, log, limits, places)
+    places = dict(zip((e for e in root.iter() if isinstance(e.tag, str)), tags, strict=False))
+    return Node(root, _Document(source, log, limits, places))
 
 
-def _parse(source: Source, log: DiagnosticLog) -> Any:
-    # The declared encoding is dropped: the text is decoded already, and lxml refuses both.
-    text = re.sub(r"^\s*(<\?xml[^>]*?)\s+encoding\s*=\s*[\"'][^\"']*[\"']", r"\1", source.text)
-    skipped = len(source.text) - len(source.text.lstrip())
-    lines_skipped = source.text.count("\n", 0, skipped)
+def _parse(source: Source, log: DiagnosticLog) -> tuple[Any, int]:
+    """Return the root and where the text that was read ends."""
+    begin = len(source.text) - len(source.text.lstrip())
     try:
-        return _from_text(text.lstrip())
+        return _from_text(source.text[begin:]), len(source.text)
     except etree.XMLSyntaxError as error:
         line, column = error.position
-        place = source.line_span(line + lines_skipped)
-        span = Span(place.path, place.line, max(1, min(column, len(place.text) + 1)), 1, place.text)
+        place = source.line_span(line + source.span(begin).line - 1)
+        column = max(1, min(column, len(place.text) + 1))
+        span = Span(place.path, place.line, column, 1, place.text)
         message = f"not well-formed XML: {str(error.msg).rstrip()}"
-        rest = _problem_alone(text, line + lines_skipped)
-        if rest is None:
-            log.fail(FormatError, "ENV140", source.path, message, span=span)
+        cut = _problem_alone(source, place.line)
+        if cut is None:
+            log.fail(
+                FormatError, "ENV140", source.path, message, hint="is the file cut off, or a tag not closed?", span=span
+            )
         log.warn(
             FormatError, "ENV214", source.path, f"{message}; only the problem above it is read",
             hint="the planner's library section is not needed, but its collision rules are unknown now", span=span,
         )  # fmt: skip
-        return _from_text(rest.lstrip())
+        closing, end = cut
+        try:
+            return _from_text(source.text[begin:end] + closing), end
+        except etree.XMLSyntaxError:
+            log.fail(FormatError, "ENV140", source.path, message, hint="close every tag", span=span)
 
 
 def _from_text(text: str) -> Any:
+    # The declared encoding is dropped: the text is decoded already, and lxml would decode it once more.
+    data = _ENCODING.sub(r"\1", text).encode("utf-8")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False, load_dtd=False)
-    return etree.fromstring(text.encode("utf-8"), parser)
+    return etree.fromstring(data, parser)
 
 
-def _problem_alone(text: str, fault_line: int) -> str | None:
-    """Return a problem file cut behind its whole `<Problem>`; None where the fault lies in it.
+def _problem_alone(source: Source, fault_line: int) -> tuple[str, int] | None:
+    """Return how to cut a problem file behind its `<Problem>`: what closes it, and where.
 
-    Published problem files have ill-formed library sections, which the planner's own parser took.
+    None where the fault lies in the problem itself. Published problem files have ill-formed library sections, which
+    the planner's own parser took.
     """
-    opening = re.search(r"<(motion_?planning)\b", text, re.IGNORECASE)
-    closing = re.search(r"</(?:MP)?Problem\s*>", text, re.IGNORECASE)
-    if not opening or not closing or text.count("\n", 0, closing.end()) + 1 >= fault_line:
+    opening, closing = _PROBLEM_ROOT.search(source.text), _PROBLEM_END.search(source.text)
+    if not opening or not closing or source.span(closing.end()).line >= fault_line:
         return None
-    return f"{text[: closing.end()]}</{opening.group(1)}>"
+    return f"</{opening.group(1)}>", closing.end()

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
-from ..dialects import RULES
 from ..errors import FormatError
 from ..model import (
     Actuator,
     BaseKind,
     Body,
     Boundary,
-    BoundaryShape,
     Connection,
-    DHParameters,
     Dialect,
     Environment,
     JointLimits,
@@ -24,35 +20,34 @@ from ..model import (
     MultiBodyKind,
     Pose,
     Recentring,
-    Resolution,
 )
-from .blocks import read_range
+from .blocks import Grammar, read_color, read_dh, read_pose
+from .boundary import SHAPES, read_extent
+from .connections import SELF_CONNECTION, read_body_index, read_limits, warn_of_no_limits
+from .lexer import Scanner
 from .xml import Node
 
-_RULES = RULES[Dialect.E]
+_GRAMMAR = Grammar.of(Dialect.E)
 _JOINTS = {"revolute": JointType.REVOLUTE, "spherical": JointType.SPHERICAL, "nonactuated": JointType.NON_ACTUATED}
+_RANGES = {JointType.REVOLUTE: ("range",), JointType.SPHERICAL: ("range", "range2"), JointType.NON_ACTUATED: ()}
 _KINDS = {"passive": MultiBodyKind.PASSIVE, "internal": MultiBodyKind.INTERNAL, "surface": MultiBodyKind.SURFACE}
 _ADJUSTMENTS = {"none": Recentring.NONE, "com": Recentring.COM, "surface": Recentring.SURFACE}
+_BASES = {"planar": "Planar", "volumetric": "Volumetric", "fixed": "Fixed"}
 _MOVEMENTS = {"rotational": "Rotational", "translational": "Translational"}
 _RESOLUTIONS = {"positionRes": "position", "orientationRes": "orientation", "timeRes": "time"}
+_BODY_ATTRIBUTES = ("filename", "comAdjustment", "color", "type", "transform", "mass")
 
 
 def read_environment(node: Node) -> Environment:
     """Read an `<Environment>` element: boundary and obstacles."""
-    boundary: Boundary | None = None
-    multibodies: list[MultiBody] = []
-    for child in node.children("Boundary", "MultiBody"):
-        if child.tag.lower() == "boundary":
-            boundary = _read_boundary(child)
-        else:
-            multibodies.append(_read_obstacle(child))
+    multibodies = tuple(_read_obstacle(child) for child in node.children("MultiBody"))
     node.ignore_other_children("Boundary", "MultiBody")
     path = node.source.path
     environment = Environment(
         name=Path(path).stem,
         dialect=Dialect.E,
-        multibodies=tuple(multibodies),
-        boundary=boundary,
+        multibodies=multibodies,
+        boundary=_read_boundaries(node),
         declared_multibodies=len(multibodies),
         directory=Path(path).parent,
         path=path,
@@ -64,33 +59,44 @@ def with_environment_attributes(environment: Environment, node: Node) -> Environ
     """Apply the attributes of an `<Environment>` element, which override the file (env-format section 8.1)."""
     resolution = environment.resolution
     for attribute, name in _RESOLUTIONS.items():
-        if node.get(attribute) is not None:
-            value = node.number(attribute)
-            if value >= 0:
-                value = value * _RULES.configuration_angle if name == "orientation" else value
-                resolution = replace(resolution, **{name: value})
+        value = node.number(attribute) if node.get(attribute) is not None else 0.0
+        if value > 0:
+            value = value * _GRAMMAR.rules.configuration_angle if name == "orientation" else value
+            resolution = replace(resolution, **{name: value})
     kept = tuple(sorted((k, v) for k, v in node.attributes.items() if k not in ("filename", "input_env")))
     return replace(environment, resolution=resolution, attributes=(*environment.attributes, *kept))
 
 
 def read_robot(node: Node) -> MultiBody:
     """Read a `<Robot>` element: one active multibody and its actuators."""
-    found = list(node.children("MultiBody"))
-    if len(found) != 1:
-        node.fail("ENV145", f"<Robot> has {len(found)} <MultiBody> elements; expected one")
-    body = found[0]
-    bases = list(body.children("Base"))
-    if len(bases) != 1:
-        body.fail("ENV145", f"<MultiBody> has {len(bases)} <Base> elements; expected one")
-    bodies = [_read_body(bases[0], _read_base(bases[0]))]
+    multibody = node.only_child("MultiBody", "ENV145")
+    if multibody.get("type") is not None:
+        multibody.choice("type", {"active": None})
+    base = multibody.only_child("Base", "ENV145")
+    links = list(multibody.children("Link"))
+    bodies = [_read_body(base, _read_base(base), "movement")]
     connections: list[Connection] = []
-    links = list(body.children("Link"))
     for number, link in enumerate(links, 1):
-        _check_link_index(link, number)
-        bodies.append(_read_body(link, BaseKind.JOINT))
+        _check_link(link, number)
+        bodies.append(_read_body(link, BaseKind.JOINT, "index"))
         connections.append(_read_connection(link, number, len(links) + 1))
-    body.ignore_other_children("Base", "Link")
+    multibody.ignore_other_children("Base", "Link")
+    multibody.ignore_other_attributes("type")
     node.ignore_other_children("MultiBody", "Actuator")
+    node.ignore_other_attributes()
+    return MultiBody(
+        MultiBodyKind.ACTIVE,
+        tuple(bodies),
+        tuple(connections),
+        dialect=Dialect.E,
+        dh_form=_GRAMMAR.rules.dh_form,
+        actuators=_read_actuators(node),
+        robot_file=node.source.path,
+        span=multibody.span,
+    )
+
+
+def _read_actuators(node: Node) -> tuple[Actuator, ...]:
     actuators = tuple(
         Actuator(a.get("label") or "", tuple(sorted(a.attributes.items())), a.span) for a in node.children("Actuator")
     )
@@ -99,125 +105,140 @@ def read_robot(node: Node) -> MultiBody:
             "ENV308", "<Actuator>", f"{len(actuators)} planner actuators are kept, but not simulated",
             hint="actuators='position' adds position actuators", span=actuators[0].span,
         )  # fmt: skip
-    return MultiBody(
-        MultiBodyKind.ACTIVE,
-        tuple(bodies),
-        tuple(connections),
-        dialect=Dialect.E,
-        dh_form=_RULES.dh_form,
-        actuators=actuators,
-        robot_file=node.source.path,
-        span=body.span,
-    )
+    return actuators
+
+
+def _read_boundaries(node: Node) -> Boundary | None:
+    """Return the boundary of the workspace; one of the configuration space only where there is no other."""
+    found = [(child, _read_boundary(child)) for child in node.children("Boundary")]
+    if not found:
+        return None
+    used, boundary = next((f for f in found if f[1].space == "workspace"), found[0])
+    for child, _ in found:
+        if child.element is not used.element:
+            child.ignore("another <Boundary> is not used")
+    if boundary.space != "workspace":
+        node.log.warn(
+            FormatError, "ENV212", "Boundary", f"a boundary of the {boundary.space} is used as one of the workspace",
+            hint="give a boundary with space='workspace'", span=used.span_of("space"),
+        )  # fmt: skip
+    return boundary
 
 
 def _read_boundary(node: Node) -> Boundary:
-    shape = node.choice("shape", {s.value.lower(): s for s in BoundaryShape})
-    space = node.get("space") or "workspace"
-    if space != "workspace":
-        node.log.warn(
-            FormatError, "ENV212", "Boundary", f"a boundary of the {space} is used as one of the workspace",
-            span=node.span_of("space"),
-        )  # fmt: skip
-    scan = node.scan("limits")
-    scan.punctuation("[", "before the boundary")
-    if shape in (BoundaryShape.SPHERE, BoundaryShape.SPHERE2D):
-        center: list[float] = []
-        while scan.next_is_number():
-            center.append(scan.number("centre"))
-        scan.punctuation(";", "before the radius")
-        radius = scan.number("radius")
-        if not 2 <= len(center) <= 3 or radius <= 0:
-            node.fail("ENV119", "expected two or three centre coordinates and a positive radius", at="limits")
-        scan.punctuation("]", "after the boundary")
-        return Boundary(shape, center=tuple(center), radius=radius, space=space, span=node.span)
-    ranges = [read_range(scan, "a range of the boundary")]
-    while scan.peek() == ";":
-        scan.punctuation(";", "between two ranges")
-        ranges.append(read_range(scan, "a range of the boundary"))
-    scan.punctuation("]", "after the boundary")
-    if not 2 <= len(ranges) <= 3:
-        node.fail("ENV119", f"a box with {len(ranges)} ranges; expected two or three", at="limits")
-    lower, upper = tuple(r[0] for r in ranges), tuple(r[1] for r in ranges)
-    return Boundary(shape, lower=lower, upper=upper, space=space, span=node.span)
+    shape = node.choice("shape", SHAPES)
+    space = node.choice("space", {"workspace": "workspace", "cspace": "cspace"}) if node.get("space") else "workspace"
+    boundary = node.read("limits", lambda scan: read_extent(scan, shape, node.span_of("limits")))
+    node.ignore_other_attributes("shape", "space", "limits")
+    return replace(boundary, space=space, span=node.span)
 
 
 def _read_obstacle(node: Node) -> MultiBody:
     kind = node.choice("type", _KINDS)
-    bases = list(node.children("Base"))
-    if len(bases) != 1:
-        node.fail("ENV145", f"<MultiBody> has {len(bases)} <Base> elements; expected one")
+    base = node.only_child("Base", "ENV145")
     node.ignore_other_children("Base")
-    body = _read_body(bases[0], BaseKind.FIXED)
-    pose = _read_pose(bases[0], "transform") if bases[0].get("transform") is not None else Pose()
-    return MultiBody(
-        kind, (replace(body, pose=pose),), dialect=Dialect.E, dh_form=_RULES.dh_form, span=node.span
-    )  # fmt: skip
+    if base.get("type") is not None and base.choice("type", {**_BASES, "joint": "Joint"}) != "Fixed":
+        base.fail(
+            "ENV123",
+            f"an obstacle with a {base.get('type')} base; expected fixed",
+            hint="write type='fixed'",
+            at="type",
+        )
+    body = _read_body(base, BaseKind.FIXED)
+    return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_GRAMMAR.rules.dh_form, span=node.span)
 
 
 def _read_base(node: Node) -> BaseKind:
-    kind = node.choice("type", {"planar": "Planar", "volumetric": "Volumetric", "fixed": "Fixed"})
+    kind = node.choice("type", _BASES)
     if kind == "Fixed":
         return BaseKind.FIXED
     return BaseKind(f"{kind} {node.choice('movement', _MOVEMENTS)}")
 
 
-def _read_body(node: Node, base: BaseKind) -> Body:
-    color = None
-    if node.get("color") is not None:
-        r, g, b, a = node.numbers("color", "red green blue alpha")
-        color = (r, g, b, a)
-    pose = _read_pose(node, "transform") if base is BaseKind.FIXED and node.get("transform") is not None else None
-    mass = node.number("mass") if node.get("mass") is not None else None
-    if mass is not None and mass <= 0:
-        node.fail("ENV118", f"mass {mass:g}; expected a positive number", at="mass")
+def _read_body(node: Node, base: BaseKind, *more_attributes: str) -> Body:
     # XML meshes are not recentred by default, unlike those of text files (env-format section 10.3).
     recentring = Recentring.NONE if node.get("comAdjustment") is None else node.choice("comAdjustment", _ADJUSTMENTS)
-    return Body(
-        node.require("filename"), base, pose, recentring, color, mass=mass, span=node.span_of("filename")
+    body = Body(
+        node.require("filename"),
+        base,
+        recentring=recentring,
+        color=node.read("color", read_color) if node.get("color") is not None else None,
+        mass=_read_mass(node) if node.get("mass") is not None else None,
+        span=node.span_of("filename"),
+    )
+    node.ignore_other_attributes(*_BODY_ATTRIBUTES, *more_attributes)
+    return replace(body, pose=_read_fixed_pose(node)) if base is BaseKind.FIXED else body
+
+
+def _read_fixed_pose(node: Node) -> Pose:
+    if node.get("transform") is not None:
+        return node.read("transform", _pose)
+    node.log.warn(
+        FormatError, "ENV219", f"<{node.tag}>", "a fixed body without transform; it stands at the origin",
+        hint="write transform='x y z rx ry rz'", span=node.span,
     )  # fmt: skip
+    return Pose()
 
 
-def _check_link_index(link: Node, number: int) -> None:
+def _read_mass(node: Node) -> float:
+    mass = node.number("mass")
+    if mass <= 0:
+        node.fail(
+            "ENV118", f"mass {mass:g}; expected a positive number",
+            hint="leave it out to have it computed from the density", at="mass",
+        )  # fmt: skip
+    return mass
+
+
+def _check_link(link: Node, number: int) -> None:
     if link.get("index") is not None and link.integer("index") != number:
-        link.fail("ENV146", f"link index {link.get('index')} where {number} was expected", at="index",
-                  hint="links stand in the order of their indices")  # fmt: skip
+        link.fail(
+            "ENV146", f"link index {link.get('index')} where {number} was expected",
+            hint="links stand in the order of their indices", at="index",
+        )  # fmt: skip
+    if link.get("type") is not None:
+        link.choice("type", {"joint": None})
 
 
 def _read_connection(link: Node, number: int, bodies: int) -> Connection:
-    found = list(link.children("Connection"))
-    if len(found) != 1:
-        at = found[1] if len(found) > 1 else link
-        at.fail("ENV147", f"link {number} has {len(found)} connections; an XML robot's link has exactly one parent")
-    node = found[0]
-    previous, following = node.integer("parentIndex"), node.integer("childIndex")
-    for name, value in (("parentIndex", previous), ("childIndex", following)):
-        if not 0 <= value < bodies:
-            node.fail("ENV115", f"{name} {value} is out of range; the robot has {bodies} bodies", at=name)
+    node = link.only_child("Connection", "ENV147")
+    link.ignore_other_children("Connection")
+
+    def index(name: str) -> int:
+        return node.read(name, lambda scan: read_body_index(scan, bodies))
+
+    previous, following = index("parentIndex"), index("childIndex")
     if following != number:
-        node.fail("ENV147", f"the connection of link {number} leads to body {following}", at="childIndex")
+        node.fail(
+            "ENV147", f"the connection of link {number} leads to body {following}; expected {number}",
+            hint="each link holds the one connection that leads to it", at="childIndex",
+        )  # fmt: skip
+    if previous == following:
+        node.fail("ENV116", SELF_CONNECTION.format(previous), hint="parentIndex names another body", at="parentIndex")
     joint = node.choice("joint", _JOINTS)
-    names = {JointType.REVOLUTE: ("range",), JointType.SPHERICAL: ("range", "range2")}.get(joint, ())
-    alpha, a, d, theta = node.numbers("initialDHParams", "alpha a d theta")
+    ranges = _RANGES[joint]
+    node.ignore_other_attributes(
+        "parentIndex", "childIndex", "joint", "transformParentToDH", "initialDHParams", "transformDHToChild", *ranges
+    )
     return Connection(
         previous,
         following,
         joint,
-        to_dh=_read_pose(node, "transformParentToDH"),
-        dh=DHParameters(alpha, a, d, theta, node.span_of("initialDHParams")),
-        to_body=_read_pose(node, "transformDHToChild"),
-        limits=tuple(_read_limits(node, name) for name in names if node.get(name) is not None),
+        to_dh=node.read("transformParentToDH", _pose),
+        dh=node.read("initialDHParams", lambda scan: read_dh(scan, _GRAMMAR)),
+        to_body=node.read("transformDHToChild", _pose),
+        limits=tuple(_read_limits(node, name, joint) for name in ranges),
         span=node.span,
     )
 
 
-def _read_limits(node: Node, name: str) -> JointLimits:
-    lower, upper = read_range(node.scan(name), name)
-    unit = _RULES.configuration_angle
-    return JointLimits(lower * unit, upper * unit, node.span_of(name))
+def _read_limits(node: Node, name: str, joint: JointType) -> JointLimits:
+    if node.get(name) is not None:
+        return node.read(name, lambda scan: read_limits(scan, _GRAMMAR, joint))
+    warn_of_no_limits(node.log, _GRAMMAR, joint, node.span)
+    unit = _GRAMMAR.rules.configuration_angle
+    return JointLimits(-unit, unit, node.span)
 
 
-def _read_pose(node: Node, name: str) -> Pose:
-    x, y, z, rx, ry, rz = node.numbers(name, "x y z rx ry rz")
-    unit = math.pi / 180
-    return Pose((x, y, z), (rx * unit, ry * unit, rz * unit), node.span_of(name))
+def _pose(scan: Scanner) -> Pose:
+    return read_pose(scan, _GRAMMAR)
