@@ -12,10 +12,11 @@ from .errors import Diagnostic, DiagnosticLog
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
 from .mjcf.compiler import Document, compile_mjcf
-from .model import Environment, scaled
+from .model import Environment
 from .names import dof_names
 from .options import Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
+from .scaling import scaled
 from .space import ConfigurationSpace
 from .transforms import Array
 

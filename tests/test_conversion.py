@@ -125,7 +125,7 @@ def test_a_folder_that_may_not_be_written_is_named(tmp_path: Path) -> None:
 def test_options_are_checked_before_anything_is_done(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="did you mean 'collision'"):
         env2mjcf.convert(SEED, tmp_path / "out", colision="hull")
-    with pytest.raises(ValueError, match="'hul'.*did you mean 'hull'"):
+    with pytest.raises(ValueError, match=r"'hul'.*did you mean 'hull'"):
         env2mjcf.convert(SEED, tmp_path / "out", collision="hul")
     with pytest.raises(ValueError, match="positive"):
         env2mjcf.load(SEED, scale=-1)

@@ -47,7 +47,12 @@ def test_the_seed_robot_stands_where_the_specification_says(tmp_path: Path) -> N
     turned = [[-0.809017, 0, -0.587785], [0, 1, 0], [0.587785, 0, -0.809017]]
     np.testing.assert_allclose(poses[1, :3, :3], turned, atol=5e-7)
     poses = robot.forward(np.array([1, 2, 3, 0.1, 0.2, 0.3, 0.25, 0, 0.5]) * units)
-    expected = [[1, 2, 3], [1.045152, 2.241458, 2.859789], [1.173653, 2.606818, 2.959789], [1.173653, 2.606818, 2.959789]]
+    expected = [
+        [1, 2, 3],
+        [1.045152, 2.241458, 2.859789],
+        [1.173653, 2.606818, 2.959789],
+        [1.173653, 2.606818, 2.959789],
+    ]
     np.testing.assert_allclose(poses[:, :3, 3], expected, atol=5e-7)
 
 
@@ -121,9 +126,7 @@ def test_the_recorded_loops_are_closed(corpus: Path) -> None:
 def test_branchs_at_zero_is_the_scene_that_its_authors_placed_by_hand(corpus: Path) -> None:
     folder = corpus / "scenes" / "old-testBranchs.branchs"
     robot = RobotKinematics.of(env2mjcf.read(folder / "branchs.env").robots[0])
-    placed = env2mjcf.read(
-        corpus / "scenes" / "old-testBranchs.vizmo.branchs" / "vizmo.branchs.env"
-    )
+    placed = env2mjcf.read(corpus / "scenes" / "old-testBranchs.vizmo.branchs" / "vizmo.branchs.env")
     q = np.zeros(robot.dim)
     q[2] = 30
     expected = [m.bodies[0].pose.position for m in placed.robots if m.bodies[0].pose]

@@ -205,7 +205,9 @@ def test_what_mujoco_refuses_is_told_by_the_line_of_the_env_file(
     from env2mjcf.mjcf import bodies
 
     path = write_scene(tmp_path, free_cube("5 0 0 0 0 0"))
-    monkeypatch.setattr(bodies, "numbers", lambda v: "1 1 9" if np.shape(v) == (3,) else "1 0 0 0" if np.shape(v) == (4,) else "1")
+    monkeypatch.setattr(
+        bodies, "numbers", lambda v: "1 1 9" if np.shape(v) == (3,) else "1 0 0 0" if np.shape(v) == (4,) else "1"
+    )
     with pytest.raises(env2mjcf.ConversionError) as caught:
         env2mjcf.load(path)
     assert caught.value.code == "MJC401"

@@ -9,8 +9,9 @@ from texts import NON_HOLONOMIC, B, C, D, E, Reader, codes, fault, place, warnin
 
 from env2mjcf.dofs import DofKind
 from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring, scaled
+from env2mjcf.model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
 from env2mjcf.options import Limits
+from env2mjcf.scaling import scaled
 
 
 @pytest.mark.parametrize(("text", "dialect"), [(B, "B"), (C, "C"), (D, "D"), (NON_HOLONOMIC, "D"), (E, "E")])

@@ -48,9 +48,10 @@ def test_links_stand_where_the_golden_vectors_put_them(corpus: Path, name: str, 
 def test_the_page_reading_agrees_where_the_golden_vectors_have_it(corpus: Path, name: str) -> None:
     golden = real_scene(name).read_golden()
     if "page" not in golden:
-        assert not any(
-            c.joint for r in env2mjcf.read(real_scene(name).env).robots for c in r.connections
-        ) or golden["dialect"] != "A"
+        assert (
+            not any(c.joint for r in env2mjcf.read(real_scene(name).env).robots for c in r.connections)
+            or golden["dialect"] != "A"
+        )
         return
     scene = load(name, collision="hull", semantics="page")
     for row in golden["page"]:
@@ -82,7 +83,9 @@ def test_queries_decode_to_the_recorded_poses(corpus: Path, name: str) -> None:
     for (robot, q), row in zip(rows, golden["query"], strict=True):
         assert robot == 0
         columns = scene.space.robot_slices[0]
-        np.testing.assert_allclose(scene.space.encode(q)[columns], row["cfg"], rtol=0, atol=1e-10)  # printed with ten decimals
+        np.testing.assert_allclose(
+            scene.space.encode(q)[columns], row["cfg"], rtol=0, atol=1e-10
+        )  # printed with ten decimals
         poses = scene.link_poses(q)[: len(row["poses"])]
         assert deviation(poses, matrices(row["poses"])) < 1e-9
     keys = {scene.model.key(i).name for i in range(scene.model.nkey)}

@@ -25,7 +25,7 @@ def scene(request: pytest.FixtureRequest) -> env2mjcf.Scene:
 def test_names_and_slices_cover_the_space(scene: env2mjcf.Scene) -> None:
     space = scene.space
     assert len(set(space.names)) == space.dim == len(space.lower) == len(space.upper) == len(space.periodic)
-    assert [s.stop - s.start for s in space.robot_slices] and space.robot_slices[-1].stop == space.dim
+    assert sum(s.stop - s.start for s in space.robot_slices) == space.robot_slices[-1].stop == space.dim
     assert all(name.split(".")[0] in "".join(scene.link_names) for name in space.names)
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..dialects import RULES
 from ..kinematics import RobotKinematics
-from ..model import Boundary, Dialect, Environment, Resolution, scaled
+from ..model import Boundary, Dialect, Environment, Resolution
 from ..names import body_names, dof_names
+from ..scaling import scaled
 from ..space import ConfigurationSpace
 from .readings import Readings, compare_readings
 

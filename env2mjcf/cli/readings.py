@@ -10,8 +10,9 @@ import numpy as np
 
 from ..formats.reading import read
 from ..kinematics import RobotKinematics
-from ..model import Dialect, Environment, scaled
+from ..model import Dialect, Environment
 from ..names import body_names
+from ..scaling import scaled
 from ..transforms import Array
 
 
