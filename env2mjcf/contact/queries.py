@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -13,9 +14,11 @@ from ..geometry.assembly import Part
 from ..pipeline import Compiled
 from ..transforms import Array
 from .boundary import BoundaryTest
+from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
 from .static_pairs import static_contacts
+from .surfaces import Surfaces
 from .types import Contact
 
 
@@ -39,6 +42,7 @@ class ContactQueries:
         self._bodies = np.array([model.body(p.name).id for p in self.links], dtype=np.int64)
         self._boundary = BoundaryTest(assembly.environment.boundary, self.links)
         self._containment = Containment(self._pairs, self._parts)
+        self._collision = compiled.options.collision
         self._scratch = threading.local()
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -66,6 +70,15 @@ class ContactQueries:
         if valid.any():
             valid[valid] = ~self.collisions(rows[valid])
         return valid
+
+    def clearances(self, rows: Array) -> Array:
+        """Return the least signed distance over the tested pairs, (n,); inf without pairs."""
+        return self._clearance.signed(self._poses_by_name(rows), len(rows))
+
+    @cached_property
+    def _clearance(self) -> Clearance:
+        surfaces = Surfaces(self._parts, self._collision)
+        return Clearance(self._pairs, surfaces, self._assembly.extent)
 
     def contacts(self, row: Array) -> list[Contact]:
         """Return every contact of one configuration, (dim,)."""

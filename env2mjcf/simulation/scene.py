@@ -218,14 +218,45 @@ class Scene:
         """Return every contact of one configuration, pairs that cannot move included."""
         return self._queries.contacts(self._row(q))
 
-    def clearance(self, q: ArrayLike) -> float | Array:
-        """Not available yet: exact clearance needs the triangle engine.
+    def clearance(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+    ) -> Any:
+        """Return the least distance over the tested pairs, in metres; the boundary is not counted.
+
+        Free: the distance of the triangles, exact but for rounding (1e-12 of the extent); +inf without pairs.
+        In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
+        of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
+        the shortest translation that does. For two convex bodies it is that translation, unless that one is square to
+        an edge of each. It fades to zero as bodies come free.
+
+        What collides is what is measured: with `collision="hull"` (and "coacd") the hulls instead of the triangles,
+        with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
+        of closed meshes.
+
+        Args:
+            q: Configurations, (dim,) or (n, dim).
+            threads: As for `in_collision`.
+            executor: Not available yet.
+            progress: Show a progress bar on a terminal.
+
+        Returns:
+            A float, or (n,) floats.
 
         Raises:
-            NotImplementedError: Always.
+            ValueError: q has a wrong shape or a value that is not finite.
+            NotImplementedError: The executor is not available yet.
         """
-        self.space.check(q)
-        raise NotImplementedError("clearance() is not available yet; contacts() and in_collision() are")
+        _only_available("auto", executor)
+
+        def answer(rows: Array) -> Array:
+            return in_chunks(rows, self._queries.clearances, threads, progress, np.float64)
+
+        return self._scalar_or_rows(q, answer)
 
     # Edges and paths.
 
