@@ -11,7 +11,7 @@ from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_distance import nearest
 from ..geometry.triangle_search import Jobs, Search
 from ..geometry.triangle_sweep import escapes
-from .surfaces import Surface, Surfaces
+from .surfaces import Surface, Surfaces, unit_normals
 
 # The first window is this fraction of the smaller mesh; each next one is this many times as long.
 _FIRST_WINDOW = 0.05
@@ -19,8 +19,7 @@ _WIDER = 4.0
 # Of a pair that is not convex: how many pairs of touching triangles, and how many other directions, are tried.
 _TOUCHING, _OTHERS = 3, 4
 
-_FAN = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-_FAN /= np.linalg.norm(_FAN, axis=1, keepdims=True)
+_FAN = np.array([np.array(d) / np.linalg.norm(d) for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +67,7 @@ def separations(surfaces: Surfaces, jobs: Jobs, touching: Ints, touch: float) ->
         if len(hits):
             first = surfaces.trees.triangles[hits[:, 1]]
             second = surfaces.trees.triangles[hits[:, 2]] @ rotation.T
-            normals = np.concatenate([_normals(first), _normals(second)])
+            normals = np.concatenate([unit_normals(first), unit_normals(second)])
             chosen, offset = np.concatenate([normals, -normals, directions[order[:_OTHERS]]]), 0.0
         else:
             towards, gap = _nearest(surfaces, jobs.only(np.array([k])), touch)
@@ -123,12 +122,6 @@ def _nearest(surfaces: Surfaces, job: Jobs, touch: float) -> tuple[Floats, float
     moved = triangles[found.triangle_b] @ job.rotation[0].T + job.translation[0]
     points = nearest(triangles[found.triangle_a], moved)
     return _unit(points.on_b[0] - points.on_a[0]), float(points.distance[0])
-
-
-def _normals(triangles: Floats) -> Floats:
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
 
 
 def _unit(vector: Floats) -> Floats:

@@ -23,6 +23,7 @@ class Surface:
     Attributes:
         triangles: (m, 3, 3) in the frame of the mesh.
         solid: Whether a body inside it counts as touching.
+        outward: Whether it is solid and its normals are known to point outwards.
         convex: Whether it is the boundary of its hull.
         points: (c, 3) one corner of each component.
         corners: (v, 3) all corners, once each.
@@ -31,6 +32,7 @@ class Surface:
 
     triangles: Floats
     solid: bool
+    outward: bool
     convex: bool
     points: Floats
     corners: Floats
@@ -103,14 +105,21 @@ def _surface(part: Part, collision: Collision) -> Surface:
     if collision in ("hull", "coacd") and not analysis.convex:
         # What collides is not the mesh but these hulls.
         hulls = [hull_triangles(p.vertices + p.center) for p in shape.pieces]
-        return _made(np.concatenate(hulls), True, len(hulls) == 1, np.array([h[0, 0] for h in hulls]))
+        return _made(np.concatenate(hulls), True, True, len(hulls) == 1, np.array([h[0, 0] for h in hulls]))
     triangles = analysis.vertices[analysis.faces]
     first = np.unique(analysis.component, return_index=True)[1]
-    return _made(triangles, analysis.closed and collision != "surface", analysis.convex, triangles[first, 0])
+    inside = collision != "surface"
+    return _made(triangles, analysis.closed and inside, analysis.solid and inside, analysis.convex, triangles[first, 0])
 
 
-def _made(triangles: Floats, solid: bool, convex: bool, points: Floats) -> Surface:
+def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, points: Floats) -> Surface:
+    return Surface(
+        triangles, solid, outward, convex, points, np.unique(triangles.reshape(-1, 3), axis=0), unit_normals(triangles)
+    )
+
+
+def unit_normals(triangles: Floats) -> Floats:
+    """Return unit normals of triangles (m, 3, 3); zero where a triangle has none."""
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    return Surface(triangles, solid, convex, points, np.unique(triangles.reshape(-1, 3), axis=0), normals)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)

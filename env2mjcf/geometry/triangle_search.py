@@ -35,9 +35,7 @@ class Jobs:
 
     def only(self, chosen: Ints | Bools) -> Jobs:
         """Return some of the jobs."""
-        return Jobs(
-            self.a[chosen], self.b[chosen], self.rotation[chosen], self.translation[chosen], self.group[chosen]
-        )
+        return Jobs(self.a[chosen], self.b[chosen], self.rotation[chosen], self.translation[chosen], self.group[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +93,20 @@ class Search:
             job, a, b = opened(trees, job, a, b)
         self._exactly(job, trees.triangle[a], trees.triangle[b], low)
         touching = np.concatenate(self._touching) if self._touching else np.zeros((0, 3), dtype=np.int64)
-        return Closest(self._distance, *self._where.T, touching)
+        job, a, b = self._where.T
+        return Closest(self._distance, job, a, b, touching)
+
+    def within(self, reach: float) -> Ints:
+        """Return job and triangles, (k, 3), of all pairs of triangles that may be within reach; not pruned further."""
+        trees, jobs = self._trees, self._jobs
+        job = np.arange(len(jobs.a), dtype=np.int64)
+        a, b = trees.roots[jobs.a], trees.roots[jobs.b]
+        while True:
+            kept = self._bounds(job, a, b)[0] <= reach
+            job, a, b = job[kept], a[kept], b[kept]
+            if not (trees.children[a].any() or trees.children[b].any()):
+                return np.stack([job, trees.triangle[a], trees.triangle[b]], axis=1)
+            job, a, b = opened(trees, job, a, b)
 
     def _bounds(self, job: Ints, a: Ints, b: Ints) -> tuple[Floats, Floats]:
         """Return lower and upper bounds of the distance of nodes.

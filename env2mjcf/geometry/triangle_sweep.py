@@ -57,9 +57,7 @@ def _swept(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> tup
         job, a, b = opened(trees, job, a, b)
 
 
-def _boxes_meet(
-    trees: Forest, jobs: Jobs, directions: Floats, window: Floats, job: Ints, a: Ints, b: Ints
-) -> Bools:
+def _boxes_meet(trees: Forest, jobs: Jobs, directions: Floats, window: Floats, job: Ints, a: Ints, b: Ints) -> Bools:
     """Intersect the intervals in which the boxes overlap along each axis of both."""
     rotation = jobs.rotation[job]
     apart = (rotation @ trees.center[b][..., None])[..., 0] + jobs.translation[job] - trees.center[a]

@@ -54,7 +54,7 @@ def forest(meshes: Sequence[Floats]) -> Forest:
     def shifted(arrays: list[Ints], by: Ints) -> Ints:
         return np.concatenate([a + b for a, b in zip(arrays, by, strict=False)] or [np.zeros(0, dtype=np.int64)])
 
-    out = Forest(
+    return Forest(
         triangles=joined([t.triangles for t in trees], empty.triangles),
         roots=nodes[:-1].astype(np.int64),
         center=joined([t.center for t in trees], empty.center),
@@ -65,7 +65,6 @@ def forest(meshes: Sequence[Floats]) -> Forest:
         children=shifted([t.children for t in trees], np.zeros(len(trees), dtype=np.int64)),
         triangle=shifted([t.triangle for t in trees], faces),
     )
-    return out
 
 
 def _tree(triangles: Floats) -> Forest:
