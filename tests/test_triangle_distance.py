@@ -25,10 +25,10 @@ def one(a: np.ndarray, b: np.ndarray) -> float:
 @pytest.mark.parametrize(
     ("other", "distance"),
     [
-        (FLAT + [0, 0, 2], 2.0),
-        (FLAT + [0.2, 0.2, 0], 0.0),  # in one plane, overlapping
-        (FLAT * 0.1 + [0.2, 0.2, 0], 0.0),  # in one plane, one inside the other
-        (FLAT + [3, 0, 0], 2.0),  # in one plane, apart
+        (FLAT + np.array([0, 0, 2]), 2.0),
+        (FLAT + np.array([0.2, 0.2, 0]), 0.0),  # in one plane, overlapping
+        (FLAT * 0.1 + np.array([0.2, 0.2, 0]), 0.0),  # in one plane, one inside the other
+        (FLAT + np.array([3, 0, 0]), 2.0),  # in one plane, apart
         ([[0.2, 0.2, 0.5], [0.2, 0.2, 3], [5, 5, 3]], 0.5),  # a corner above the inside
         ([[0.2, 0.2, -1], [0.2, 0.2, 1], [5, 5, 1]], 0.0),  # an edge through the inside
         ([[-1, 0.5, 1], [2, 0.5, 1], [0, 0.5, 4]], 1.0),  # an edge above an edge and the inside
@@ -143,7 +143,7 @@ def test_a_push_ends_where_the_triangles_come_free() -> None:
 
 
 def test_the_triangles_of_a_hull_enclose_its_points() -> None:
-    points = np.random.default_rng(2).normal(size=(80, 3)) + [100, 0, 0]
+    points = np.random.default_rng(2).normal(size=(80, 3)) + np.array([100, 0, 0])
     triangles = hull_triangles(points)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     heights = np.einsum("vmi,mi->vm", points[:, None] - triangles[None, :, 0], normals)

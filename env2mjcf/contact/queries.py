@@ -23,7 +23,6 @@ from .static_pairs import static_contacts
 from .surfaces import Surfaces
 from .types import Contact
 
-
 # Bodies nearer than this, in extents, may touch by the verdicts (design: section 6).
 _BAND = 1e-5
 
