@@ -43,6 +43,16 @@ def test_boxes_face_to_face_corner_to_corner_and_in_each_other(tmp_path: Path, c
         assert scene.clearance(q) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("collision", ["auto", "hull", "surface"])
+def test_cubes_that_meet_with_crossed_edges_are_parted_square_to_both(tmp_path: Path, collision: str) -> None:
+    """The other cube is turned by an eighth about y, this one about z: an edge of each points at the other's."""
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube("5 0 0 0 45 0")), collision=collision)
+    touching = 5 - 2 * np.sqrt(0.5)
+    for depth in (1e-4, 0.05, -0.05):
+        q = np.array([touching + depth, 0.1, 0.05, 0, 0, np.pi / 4])
+        assert scene.clearance(q) == pytest.approx(-depth, abs=1e-6)
+
+
 def test_one_row_gives_a_float_and_many_rows_an_array(cube: env2mjcf.Scene) -> None:
     assert type(cube.clearance(at(0, 0, 0))) is float
     rows = np.stack([at(0, 0, 0), at(4.25, 0, 0), at(3, 0, 0)])

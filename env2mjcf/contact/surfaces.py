@@ -27,6 +27,7 @@ class Surface:
         convex: Whether it is the boundary of its hull.
         points: (c, 3) one corner of each component.
         corners: (v, 3) all corners, once each.
+        edges: (e, 3) unit directions of the edges, each once.
         normals: (m, 3) unit normals, zero where a triangle has none; outwards if `convex`.
     """
 
@@ -36,6 +37,7 @@ class Surface:
     convex: bool
     points: Floats
     corners: Floats
+    edges: Floats
     normals: Floats
 
 
@@ -113,13 +115,22 @@ def _surface(part: Part, collision: Collision) -> Surface:
 
 
 def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, points: Floats) -> Surface:
-    return Surface(
-        triangles, solid, outward, convex, points, np.unique(triangles.reshape(-1, 3), axis=0), unit_normals(triangles)
-    )
+    corners = np.unique(triangles.reshape(-1, 3), axis=0)
+    along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
+    along = unit(along[(along != 0).any(axis=1)])
+    # One of the two directions of an edge; rounded, so that parallel edges are one.
+    largest = np.argmax(np.abs(along), axis=1)
+    along *= np.sign(np.take_along_axis(along, largest[:, None], axis=1))
+    edges = along[np.unique(np.round(along, 9), axis=0, return_index=True)[1]]
+    return Surface(triangles, solid, outward, convex, points, corners, edges, unit_normals(triangles))
 
 
 def unit_normals(triangles: Floats) -> Floats:
     """Return unit normals of triangles (m, 3, 3); zero where a triangle has none."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    return unit(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return vectors (..., 3) at length one; zero where they have no length."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

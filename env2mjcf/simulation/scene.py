@@ -231,8 +231,8 @@ class Scene:
         Free: the distance of the triangles, exact but for rounding (1e-12 of the extent); +inf without pairs.
         In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
         of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
-        the shortest translation that does. For two convex bodies it is that translation, unless that one is square to
-        an edge of each. It fades to zero as bodies come free.
+        the shortest translation that does. For two convex bodies of few faces it is that translation (for many faces,
+        not always). It fades to zero as bodies come free.
 
         What collides is what is measured: with `collision="hull"` (and "coacd") the hulls instead of the triangles,
         with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
