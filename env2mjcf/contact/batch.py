@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from ..transforms import Array
 # Below this many rows threads cost more than they bring.
 _ROWS_FOR_THREADS = 10_000
 _CHUNK = 2_000
+
+_Answer = TypeVar("_Answer", np.bool_, np.float64)
 
 
 def thread_count(threads: int | None, rows: int) -> int:
@@ -32,8 +35,12 @@ def thread_count(threads: int | None, rows: int) -> int:
 
 
 def in_chunks(
-    rows: Array, work: Callable[[Array], NDArray[np.bool_]], threads: int | None, progress: bool
-) -> NDArray[np.bool_]:
+    rows: Array,
+    work: Callable[[Array], NDArray[_Answer]],
+    threads: int | None,
+    progress: bool,
+    kind: type[_Answer] = np.bool_,
+) -> NDArray[_Answer]:
     """Apply `work` to chunks of rows and join the answers; the same answers at any number of threads.
 
     Args:
@@ -41,8 +48,9 @@ def in_chunks(
         work: Takes (k, dim), returns (k,).
         threads: See `thread_count`.
         progress: Whether to show a progress bar on a terminal.
+        kind: What the answers are.
     """
-    answers = np.zeros(len(rows), dtype=bool)
+    answers = np.zeros(len(rows), dtype=kind)
     starts = range(0, len(rows), _CHUNK)
     count = thread_count(threads, len(rows))
     bar = tqdm(total=len(rows), unit="q", disable=not (progress and sys.stderr.isatty()), delay=1, leave=False)

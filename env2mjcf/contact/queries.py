@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
+from ..options import Collision
 from ..pipeline import Compiled
 from ..transforms import Array
 from .boundary import BoundaryTest
+from .certificate import certified
+from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
+from .manifold import Manifolds, Touch
 from .static_pairs import static_contacts
+from .surfaces import Surfaces
 from .types import Contact
+
+# Bodies nearer than this, in extents, may touch by the verdicts (design: section 6).
+_BAND = 1e-5
 
 
 class ContactQueries:
@@ -33,13 +41,16 @@ class ContactQueries:
         self._space = compiled.space
         self._assembly = assembly
         self._pairs = compiled.pairs.tested
-        self._pair_of = {frozenset((p.link, p.other)): p for p in self._pairs}
+        self._pair_of = {frozenset((p.link, p.other)): i for i, p in enumerate(self._pairs)}
         self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
         self._engine = MujocoEngine(model, document.owners)
         self._bodies = np.array([model.body(p.name).id for p in self.links], dtype=np.int64)
         self._boundary = BoundaryTest(assembly.environment.boundary, self.links)
         self._containment = Containment(self._pairs, self._parts)
+        self._collision: Collision = compiled.options.collision
         self._scratch = threading.local()
+        self._lock = threading.Lock()
+        self._of_triangles: _Triangles | None = None
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         self._static = static_contacts(model, data, self._pairs, document.owners)
@@ -67,16 +78,46 @@ class ContactQueries:
             valid[valid] = ~self.collisions(rows[valid])
         return valid
 
+    def clearances(self, rows: Array) -> Array:
+        """Return the least signed distance over the tested pairs, (n,); inf without pairs."""
+        return self._triangles.clearance.signed(self._poses_by_name(rows), len(rows))
+
+    def certify(self, start: Array, delta: Array, motion: float) -> bool:
+        """Return whether the way from `start` by `delta` is provably free.
+
+        Args:
+            start: (dim,).
+            delta: (dim,).
+            motion: Bound of how far any point of a robot moves on that way.
+        """
+        # Constant pairs are decided by themselves: a small distance of theirs must not shorten the steps.
+        constant = self._triangles.constant.signed(self._poses_by_name(start[None]), 1)
+        if self._static or constant[0] <= 0:
+            return False
+        # Two links come nearer by what both of them move.
+        movers = 2 if any(p.kind != "obstacle" for p in self._pairs) else 1
+        return certified(self._moving_clearances, start, delta, movers * motion, _BAND * self._assembly.extent)
+
+    def _moving_clearances(self, rows: Array) -> Array:
+        return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
+
     def contacts(self, row: Array) -> list[Contact]:
-        """Return every contact of one configuration, (dim,)."""
-        found: list[Contact] = []
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
+        found: dict[int, list[Touch]] = {}
         for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
-            pair = self._pair_of[frozenset((a, b))]
-            if pair.constant:
-                continue
-            direction = normal if a == pair.link else -normal
-            found.append(Contact(pair.link, pair.other, pair.kind, position, direction, distance))
-        return found + list(self._static) + self._contained(row, found)
+            index = self._pair_of[frozenset((a, b))]
+            pair = self._pairs[index]
+            if not pair.constant:
+                direction = normal if a == pair.link else -normal
+                found.setdefault(index, []).append(Touch(position, direction, distance))
+        for contact in self._static:
+            index = self._pair_of[frozenset((contact.link, contact.other))]
+            found.setdefault(index, []).append(Touch(contact.position, contact.normal, contact.distance))
+        if not found and not self._containment.needed:
+            return []
+        poses = self._poses_by_name(row[None])
+        contained = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
+        return self._triangles.manifolds.contacts(found, contained, poses)
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)
@@ -91,20 +132,27 @@ class ContactQueries:
             by_name[part.name] = np.broadcast_to(part.pose, (len(rows), 4, 4))
         return by_name
 
-    def _contained(self, row: Array, touching: Sequence[Contact]) -> list[Contact]:
-        """Return contacts of bodies that lie wholly inside others; their normals point along the bodies' centres."""
-        if not self._containment.needed:
-            return []
-        poses = self._poses_by_name(row[None])
-        seen = {(c.link, c.other) for c in touching}
-        found: list[Contact] = []
-        for index, point in self._containment.pairs_inside(poses):
-            pair = self._pairs[index]
-            if (pair.link, pair.other) in seen:
-                continue
-            apart = poses[pair.other][0, :3, 3] - poses[pair.link][0, :3, 3]
-            length = float(np.linalg.norm(apart))
-            normal = apart / length if length else np.array([0.0, 0.0, 1.0])
-            depth = -min(self._parts[pair.link].mesh.diagonal, self._parts[pair.other].mesh.diagonal)
-            found.append(Contact(pair.link, pair.other, pair.kind, point, normal, depth))
-        return found
+    @property
+    def _triangles(self) -> _Triangles:
+        # Built when it is first asked for: verdicts do without it.
+        with self._lock:
+            if self._of_triangles is None:
+                surfaces = Surfaces(self._parts, self._collision)
+                clearance = Clearance(self._pairs, surfaces, self._assembly.extent)
+                moving, constant = (
+                    Clearance(tuple(p for p in self._pairs if p.constant is c), surfaces, self._assembly.extent)
+                    for c in (False, True)
+                )
+                manifolds = Manifolds(self._pairs, self._parts, surfaces, clearance, self._assembly.extent)
+                self._of_triangles = _Triangles(clearance, moving, constant, manifolds)
+            return self._of_triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Triangles:
+    """What works on triangles instead of cells."""
+
+    clearance: Clearance
+    moving: Clearance
+    constant: Clearance
+    manifolds: Manifolds

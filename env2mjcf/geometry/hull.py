@@ -34,3 +34,25 @@ def hull_volume(points: Floats) -> float:
     body.add_freejoint()
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", density=1.0)
     return float(spec.compile().body_mass[1]) * size**3
+
+
+def hull_triangles(points: Floats) -> Floats:
+    """Return the triangles of the convex hull of points that are not coplanar, (m, 3, 3), as MuJoCo collides it.
+
+    Corners are those of `points` in full precision, though MuJoCo's qhull saw them as float32.
+    """
+    mujoco: Any = import_module("mujoco")
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    size = float(np.ptp(points, axis=0).max())
+    spec = mujoco.MjSpec()
+    local = (points - middle) / size
+    spec.add_mesh(name="hull", uservert=local.ravel())
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
+    model = spec.compile()
+    graph, turn = model.mesh_graph, np.zeros(9)
+    corners, faces = int(graph[0]), int(graph[1])
+    triangles = graph[2 + 3 * corners + 3 * faces :][: 3 * faces].reshape(-1, 3)
+    mujoco.mju_quat2Mat(turn, model.mesh_quat[0])
+    seen = model.mesh_vert.astype(np.float64) @ turn.reshape(3, 3).T + model.mesh_pos[0]
+    source = np.array([int(np.argmin(np.linalg.norm(local - v, axis=1))) for v in seen])
+    return points[source[triangles]]

@@ -1,0 +1,136 @@
+"""The triangles that bodies collide with, and which bodies have an inside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.assembly import Part
+from ..geometry.hull import hull_triangles
+from ..geometry.orientation import winding_numbers
+from ..geometry.topology import Bools, Floats, Ints
+from ..geometry.triangle_search import Jobs
+from ..geometry.triangle_tree import Forest, forest
+from ..options import Collision
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """What one mesh collides with.
+
+    Attributes:
+        triangles: (m, 3, 3) in the frame of the mesh.
+        solid: Whether a body inside it counts as touching.
+        outward: Whether it is solid and its normals are known to point outwards.
+        convex: Whether it is the boundary of its hull.
+        points: (c, 3) one corner of each component.
+        corners: (v, 3) all corners, once each.
+        edges: (e, 3) unit directions of the edges, each once.
+        normals: (m, 3) unit normals, zero where a triangle has none; outwards if `convex`.
+    """
+
+    triangles: Floats
+    solid: bool
+    outward: bool
+    convex: bool
+    points: Floats
+    corners: Floats
+    edges: Floats
+    normals: Floats
+
+
+class Surfaces:
+    """The surfaces of all bodies, and a tree over each.
+
+    Args:
+        parts: Bodies by name; those without a shape are left out.
+        collision: How the scene collides.
+    """
+
+    def __init__(self, parts: Mapping[str, Part], collision: Collision) -> None:
+        self.index: dict[str, int] = {}
+        self.of_body: list[Surface] = []
+        numbers: dict[int, int] = {}
+        distinct: list[Surface] = []
+        tree: list[int] = []
+        for name, part in parts.items():
+            if part.shape is None:
+                continue
+            key = id(part.shape)
+            if key not in numbers:
+                numbers[key] = len(distinct)
+                distinct.append(_surface(part, collision))
+            self.index[name] = len(tree)
+            self.of_body.append(distinct[numbers[key]])
+            tree.append(numbers[key])
+        self.trees: Forest = forest([s.triangles for s in distinct])
+        self.tree: Ints = np.array(tree, dtype=np.int64)
+        self._distinct = distinct
+
+    def surface(self, tree: int) -> Surface:
+        """Return the surface that a tree is over."""
+        return self._distinct[tree]
+
+    def contained(self, jobs: Jobs) -> Bools:
+        """Return whether a component of one mesh lies inside the other, (j,), given that they do not cross.
+
+        Where surfaces do not cross, a component lies inside a solid whole or not at all, so one of its corners decides.
+        """
+        out = np.zeros(len(jobs.a), dtype=np.bool_)
+        for a, b in np.unique(np.stack([jobs.a, jobs.b], axis=1), axis=0):
+            rows = np.flatnonzero((jobs.a == a) & (jobs.b == b))
+            rotation, translation = jobs.rotation[rows], jobs.translation[rows][:, None]
+            first, second = self._distinct[a], self._distinct[b]
+            if first.solid:
+                out[rows] |= _inside(first, second.points @ rotation.transpose(0, 2, 1) + translation)
+            if second.solid:
+                out[rows] |= _inside(second, (first.points - translation) @ rotation)
+        return out
+
+
+def _inside(solid: Surface, points: Floats) -> Bools:
+    """Return whether any of each row's points, (n, c, 3), is in a solid, (n,)."""
+    lower, upper = solid.corners.min(axis=0), solid.corners.max(axis=0)
+    near = ((points > lower) & (points < upper)).all(axis=-1)
+    inside = np.zeros(near.shape, dtype=np.bool_)
+    if near.any():
+        faces = np.arange(3 * len(solid.triangles)).reshape(-1, 3)
+        inside[near] = np.abs(winding_numbers(points[near], solid.triangles.reshape(-1, 3), faces)) > 0.5
+    return np.asarray(inside.any(axis=-1))
+
+
+def _surface(part: Part, collision: Collision) -> Surface:
+    analysis, shape = part.analysis, part.shape
+    assert shape is not None
+    if collision in ("hull", "coacd") and not analysis.convex:
+        # What collides is not the mesh but these hulls.
+        hulls = [hull_triangles(p.vertices + p.center) for p in shape.pieces]
+        return _made(np.concatenate(hulls), True, True, len(hulls) == 1, np.array([h[0, 0] for h in hulls]))
+    triangles = analysis.vertices[analysis.faces]
+    first = np.unique(analysis.component, return_index=True)[1]
+    inside = collision != "surface"
+    return _made(triangles, analysis.closed and inside, analysis.solid and inside, analysis.convex, triangles[first, 0])
+
+
+def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, points: Floats) -> Surface:
+    corners = np.unique(triangles.reshape(-1, 3), axis=0)
+    along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
+    along = unit(along[(along != 0).any(axis=1)])
+    # One of the two directions of an edge; rounded, so that parallel edges are one.
+    largest = np.argmax(np.abs(along), axis=1)
+    along *= np.sign(np.take_along_axis(along, largest[:, None], axis=1))
+    edges = along[np.unique(np.round(along, 9), axis=0, return_index=True)[1]]
+    return Surface(triangles, solid, outward, convex, points, corners, edges, unit_normals(triangles))
+
+
+def unit_normals(triangles: Floats) -> Floats:
+    """Return unit normals of triangles (m, 3, 3); zero where a triangle has none."""
+    return unit(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return vectors (..., 3) at length one; zero where they have no length."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
