@@ -48,6 +48,8 @@ CATALOGUE: dict[str, str] = {
     "GEO239": "Edges of a mesh have more than two faces.",
     "GEO240": "A mesh that is not convex collides as its convex hull, by choice.",
     "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
+    "GEO260": "An entry of the geometry cache was damaged and has been made anew.",
+    "GEO261": "The geometry cache cannot be read or written; everything is computed.",
     # Bodies and connections.
     # What is written for MuJoCo.
     # Configurations and queries.

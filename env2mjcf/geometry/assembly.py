@@ -15,6 +15,7 @@ from ..names import body_names
 from ..options import Options
 from ..transforms import Array
 from .analysis import Analysis, analyse, mesh_diagnostics
+from .cache import GeometryCache, default_folder
 from .inertia import Inertial, inertial
 from .loading import load_mesh
 from .mesh import Mesh
@@ -171,6 +172,7 @@ class _Meshes:
     def __init__(self, environment: Environment, options: Options, log: DiagnosticLog) -> None:
         self._options = options
         self._log = log
+        self._cache = GeometryCache(default_folder()) if options.cache else None
         self._paths = resolve_all(environment, options, log)
         self._raw: dict[Path, Mesh] = {}
         self._meshes: dict[tuple[Path, Recentring], Mesh] = {}
@@ -196,7 +198,7 @@ class _Meshes:
         analysis = self._analyses[mesh]
         if thickness is not None and mesh not in self._shapes:
             self._shapes[mesh] = collision_shape(
-                mesh, analysis, options.collision, thickness, self._log, body.filename, body.span
+                mesh, analysis, options.collision, thickness, self._log, body.filename, body.span, self._cache
             )
         shape = None if thickness is None else self._shapes[mesh]
         inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
+from .cache import GeometryCache
 from .convexity import is_convex
 from .hull import hull_volume
 from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, prisms
-from .polygons import convex_polygons
+from .polygons import Polygon, convex_polygons
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
+
+# Triangles above which reading a file is quicker than computing its content.
+_WORTH_KEEPING = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +57,7 @@ def collision_shape(
     log: DiagnosticLog,
     subject: str = "",
     span: Span | None = None,
+    cache: GeometryCache | None = None,
 ) -> CollisionShape:
     """Choose the convex pieces that stand for a mesh in collision.
 
@@ -63,6 +69,7 @@ def collision_shape(
         log: Takes a finding where the pieces are not faithful.
         subject: What the findings are about; the mesh's name if empty.
         span: Where the mesh is named in the source.
+        cache: Where results are kept between runs, if they are.
 
     Raises:
         GeometryError: The mesh is a point or a line (GEO231), or too small for MuJoCo (GEO241).
@@ -77,7 +84,18 @@ def collision_shape(
         raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, (*_STRATEGIES, *_LATER)))}")
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject or mesh.name, span)
-    shape = _STRATEGIES[strategy](mesh, analysis, thickness)
+    build = partial(_STRATEGIES[strategy], mesh, analysis, thickness)
+    if cache is not None and len(mesh.faces) > _WORTH_KEEPING:
+        shape = cache.remember(
+            ("shape", mesh.digest, strategy, thickness),
+            build,
+            kinds=(CollisionShape, ConvexPiece, Polygon),
+            known={"mesh": mesh, "analysis": analysis},
+            log=log,
+            subject=subject or mesh.name,
+        )
+    else:
+        shape = build()
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
         log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
