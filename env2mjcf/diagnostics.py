@@ -50,6 +50,8 @@ CATALOGUE: dict[str, str] = {
     "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
     "GEO260": "An entry of the geometry cache was damaged and has been made anew.",
     "GEO261": "The geometry cache cannot be read or written; everything is computed.",
+    "GEO262": "CoACD crashed, hung, or gave no parts.",
+    "GEO263": "A mesh that is not convex collides as approximate parts, by choice.",
     # Bodies and connections.
     # What is written for MuJoCo.
     # Configurations and queries.

@@ -51,6 +51,10 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     for mesh in report.meshes:
         table.add_row(*_cells(mesh.file, mesh.triangles, _yes(mesh.closed), _yes(mesh.convex), mesh.cells, mesh.note))
     yield _indented(table)
+    proofs = {m.file: m.certificate for m in report.meshes if m.certificate is not None}
+    if proofs:
+        yield Text("\nHow far that is from the meshes", "bold")
+        yield _facts((file, str(proof)) for file, proof in proofs.items())
     yield Text("\nWhole scene", "bold")
     yield _facts(
         [

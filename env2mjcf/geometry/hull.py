@@ -6,12 +6,13 @@ takes the hull of the points that it is given; so MuJoCo is also asked for the v
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from .topology import Floats
+from .topology import Floats, Ints
 
 
 def hull_volume(points: Floats) -> float:
@@ -34,3 +35,32 @@ def hull_volume(points: Floats) -> float:
     body.add_freejoint()
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", density=1.0)
     return float(spec.compile().body_mass[1]) * size**3
+
+
+def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
+    """Return the triangles of the convex hull of each point set, (m, 3) indices, counter-clockwise from outside.
+
+    Computed by MuJoCo's qhull from float32 vertices: a corner that is lower than that over its neighbours may be left
+    out.
+
+    Raises:
+        ValueError: Some points are (nearly) coplanar.
+    """
+    mujoco: Any = import_module("mujoco")
+    spec = mujoco.MjSpec()
+    for i, points in enumerate(clouds):
+        size = float(np.ptp(points, axis=0).max()) or 1.0
+        local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
+        spec.add_mesh(name=str(i), uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=str(i))
+    model = spec.compile()
+    out: list[Ints] = []
+    for i, points in enumerate(clouds):
+        start, count = model.mesh_faceadr[i], model.mesh_facenum[i]
+        faces = model.mesh_face[start : start + count].astype(np.int64)
+        corners = points[faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inward = np.einsum("ij,ij->i", normals, corners[:, 0] - points[np.unique(faces)].mean(axis=0)) < 0
+        faces[inward] = faces[inward, ::-1]
+        out.append(faces)
+    return out
