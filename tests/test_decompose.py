@@ -148,7 +148,7 @@ def test_without_the_package_one_sentence_says_what_to_install(monkeypatch, caps
         ValueError, match=r"^collision='coacd' needs one more package: pip install 'env2mjcf\[decompose\]'$"
     ):
         shape(joined(box(), box(center=(3, 0, 0))))
-    assert main(["convert", str(ALPHA), "/nowhere", "--collision", "coacd"]) == 2
+    assert main(["convert", str(ALPHA), "/nowhere", "--collision", "coacd", "--no-cache"]) == 2
     assert capsys.readouterr().err == (
         "env2mjcf: convert: collision='coacd' needs one more package: pip install 'env2mjcf[decompose]'\n"
     )

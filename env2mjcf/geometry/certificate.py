@@ -22,7 +22,7 @@ APPROXIMATE = ("hull", "coacd")
 _SURFACE_POINTS = 3000
 _LATTICE_POINTS = 4096
 _LEAST_LATTICE = 1000
-_WORK = 2_000_000  # pairs of lattice points and triangles
+_WORK = 1_000_000  # pairs of lattice points and triangles
 # Each lattice point lies elsewhere in its cell, so that counts are not all wrong by the same part of a cell: Roberts,
 # "The unreasonable effectiveness of quasirandom sequences", 2018.
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
