@@ -123,6 +123,10 @@ CATALOGUE: dict[str, str] = {
     "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
     "GEO250": "The inertia of a body was not computed from its volume alone.",
     "GEO251": "A scene is so large or small that its unit is hardly the metre.",
+    "GEO260": "An entry of the geometry cache was damaged and has been made anew.",
+    "GEO261": "The geometry cache cannot be read or written; everything is computed.",
+    "GEO262": "CoACD crashed, hung, or gave no parts.",
+    "GEO263": "A mesh that is not convex collides as approximate parts, by choice.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
     "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",

@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
+from .geometry.certificate import Certificate
 from .pipeline import Compiled
 
 
@@ -19,6 +20,7 @@ class MeshReport:
         closed, convex: What it is like.
         cells: Number of convex pieces that collide for it.
         note: How it was represented, in a sentence.
+        certificate: How far these are from the mesh; None for what is only drawn.
     """
 
     file: str
@@ -27,6 +29,7 @@ class MeshReport:
     convex: bool
     cells: int
     note: str
+    certificate: Certificate | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +84,7 @@ def report(compiled: Compiled) -> Report:
                 part.analysis.convex,
                 len(shape.pieces) if shape else 0,
                 shape.note if shape else "drawn only",
+                part.certificate,
             ),
         )
     counts: dict[str, int] = {}

@@ -21,8 +21,8 @@ from .printing import one_line, print_diagnostics, print_json, print_parts, work
 
 if TYPE_CHECKING:
     from ..simulation.scene import Scene
+    from ..simulation.verdicts import Judge, Verdict
     from .rows import Configurations
-    from .verdicts import Judge, Verdict
 
 # More configurations than this are not listed one by one unless asked for.
 _LISTED = 20
@@ -61,7 +61,7 @@ class Check:
     def run(self) -> int:
         """Print a verdict on each configuration; 1 if any is invalid."""
         from ..simulation.preparing import load
-        from .verdicts import Judge
+        from ..simulation.verdicts import Judge
 
         if self.configurations and self.options.query is not None:
             raise ValueError("configurations are given twice: behind the scene and with --query")
@@ -120,14 +120,8 @@ def _verdict_lines(verdict: Verdict) -> Iterator[Text]:
     yield Text.assemble(
         f"{one_line(verdict.label)}: ", (", ".join(wrong), "bold red") if wrong else ("valid", "bold green")
     )
-    for c in verdict.contacts:
-        place = ", ".join(f"{x:.6g}" for x in c.position)
-        depth = f"{-c.distance:.3g} m deep" if c.distance < 0 else "touching"
-        yield Text(f"    {one_line(c.link)} and {one_line(c.other)} ({c.kind}): {depth} at ({place})")
-    for limit in verdict.limits:
-        yield Text(f"    {one_line(limit.name)} is {limit.value:.6g}; limits {limit.lower:.6g} to {limit.upper:.6g}")
-    if verdict.outside:
-        yield Text(f"    outside: {', '.join(one_line(n) for n in verdict.outside)}")
+    for reason in verdict.reasons():
+        yield Text(f"    {one_line(reason)}")
 
 
 def _summary(judge: Judge) -> Text:

@@ -18,6 +18,7 @@ from .printing import plain, print_diagnostics, print_json, print_parts, working
 from .tables import geometry_part, pairs_part, text_part
 
 if TYPE_CHECKING:
+    from ..simulation.census import PairCount
     from ..simulation.scene import Scene
     from .describing import SceneSummary
 
@@ -34,18 +35,22 @@ class Info:
 
     Attributes:
         scene: An env file, an XML environment or a problem XML.
-        pairs: List every pair of bodies that is tested.
+        pairs: List every pair of bodies that is tested, and how often it touches in sampled configurations.
+        samples: Number of configurations that --pairs samples.
         output: How to report.
         options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
     pairs: bool = False
+    samples: int = 1000
     output: OutputFlags = field(default_factory=Output)
     options: OptionFlags = field(default_factory=Options)
 
     def run(self) -> int:
         """Print what the text says, then what meshes and MuJoCo add to it."""
+        if self.samples < 1:
+            raise ValueError(f"--samples is {self.samples}; expected at least 1")
         from ..formats.reading import read_scene
         from .describing import describe
 
@@ -81,6 +86,12 @@ class Info:
             report = dataclasses.asdict(scene.report)
             facts |= {k: report[k] for k in ("collision", "geoms", "mass", "extent", "meshes")}
             facts["pairs"] = scene.pairs if self.pairs else len(scene.pairs)
+            if self.pairs:
+                counts = self._counts(scene)
+                facts["touching"] = {
+                    "samples": self.samples,
+                    "pairs": [{**plain(c), "verdict": c.verdict} for c in counts],
+                }
         return facts
 
     def _parts(self, summary: SceneSummary, scene: Scene | None) -> Iterator[RenderableType]:
@@ -88,4 +99,10 @@ class Info:
         if scene is not None:
             yield from geometry_part(scene.report)
             if self.pairs:
-                yield from pairs_part(scene.pairs)
+                yield from pairs_part(self._counts(scene), self.samples)
+
+    def _counts(self, scene: Scene) -> tuple[PairCount, ...]:
+        from ..simulation.census import count_touching
+
+        with working(f"looking at {self.samples} configurations"):
+            return count_touching(scene, self.samples)

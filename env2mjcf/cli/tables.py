@@ -17,6 +17,7 @@ from .printing import one_line
 
 if TYPE_CHECKING:
     from ..report import Report
+    from ..simulation.census import PairCount
 
 _UNITS = {"turns": "turns", "pi": "pi rad", "length": "length"}
 
@@ -51,6 +52,10 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     for mesh in report.meshes:
         table.add_row(*_cells(mesh.file, mesh.triangles, _yes(mesh.closed), _yes(mesh.convex), mesh.cells, mesh.note))
     yield _indented(table)
+    proofs = {m.file: m.certificate for m in report.meshes if m.certificate is not None}
+    if proofs:
+        yield Text("\nHow far that is from the meshes", "bold")
+        yield _facts((file, str(proof)) for file, proof in proofs.items())
     yield Text("\nWhole scene", "bold")
     yield _facts(
         [
@@ -62,13 +67,28 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     )
 
 
-def pairs_part(pairs: Iterable[tuple[str, str]]) -> Iterator[RenderableType]:
-    """Yield every tested pair."""
+def pairs_part(counts: Sequence[PairCount], samples: int) -> Iterator[RenderableType]:
+    """Yield every tested pair, and how often it touched."""
     yield Text("\nTested pairs", "bold")
-    table = _table("link", "other")
-    for pair in pairs:
-        table.add_row(*_cells(*pair))
+    table = _table("link", "other", "touch")
+    for count in counts:
+        table.add_row(*_cells(count.link, count.other, _touch(count)))
     yield _indented(table)
+    if any(not c.constant for c in counts):
+        often = {w: sum(c.verdict == w and not c.constant for c in counts) for w in ("never", "always")}
+        yield Text(
+            f"  sampled, not proved: home and {samples - 1} uniform configurations; "
+            f"{often['never']} pairs never touched, {often['always']} always did",
+            "dim",
+        )
+
+
+def _touch(count: PairCount) -> str:
+    if count.constant:
+        return f"{count.verdict}: neither moves against the other"
+    if count.verdict == "sometimes":
+        return f"in {count.touches} of {count.samples} samples"
+    return f"{count.verdict}, in {count.samples} samples"
 
 
 def _robot(number: int, robot: RobotSummary) -> Iterator[RenderableType]:

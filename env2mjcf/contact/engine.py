@@ -33,8 +33,10 @@ class MujocoEngine:
         self._model = copy.copy(model)
         self._model.geom_contype[self._owner < 0] = 0
         self._model.geom_conaffinity[self._owner < 0] = 0
-        # One contact is enough for a verdict, and for where two cells touch.
-        self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+        # One contact is enough for a verdict, and for where two cells touch. MuJoCo's native algorithm misses some deep
+        # overlaps of aligned boxes (coplanar plates that cross), libccd's does not.
+        for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
+            self._model.opt.disableflags |= int(flag)
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""

@@ -15,6 +15,8 @@ from ..names import body_names
 from ..options import Options
 from ..transforms import Array
 from .analysis import Analysis, analyse, mesh_diagnostics
+from .cache import GeometryCache, default_folder
+from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .loading import load_mesh
 from .mesh import Mesh
@@ -40,6 +42,7 @@ class Part:
         analysis: What the mesh is like.
         shape: Convex pieces for contact; None for a Surface body.
         inertial: Mass, centre and moments; None for a static body.
+        certificate: How far `shape` is from the mesh; None without one.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Part:
     analysis: Analysis
     shape: CollisionShape | None
     inertial: Inertial | None
+    certificate: Certificate | None = None
 
     @property
     def radius(self) -> float:
@@ -171,11 +175,13 @@ class _Meshes:
     def __init__(self, environment: Environment, options: Options, log: DiagnosticLog) -> None:
         self._options = options
         self._log = log
+        self._cache = GeometryCache(default_folder()) if options.cache else None
         self._paths = resolve_all(environment, options, log)
         self._raw: dict[Path, Mesh] = {}
         self._meshes: dict[tuple[Path, Recentring], Mesh] = {}
         self._analyses: dict[Mesh, Analysis] = {}
         self._shapes: dict[Mesh, CollisionShape] = {}
+        self._certificates: dict[Mesh, Certificate] = {}
 
     def mesh(self, body: Body) -> Mesh:
         """Return a body's mesh, recentred and scaled."""
@@ -195,14 +201,22 @@ class _Meshes:
             mesh_diagnostics(mesh, self._analyses[mesh], self._log, body.filename, body.span)
         analysis = self._analyses[mesh]
         if thickness is not None and mesh not in self._shapes:
-            self._shapes[mesh] = collision_shape(
-                mesh, analysis, options.collision, thickness, self._log, body.filename, body.span
-            )
+            self._shape(mesh, analysis, thickness, body)
         shape = None if thickness is None else self._shapes[mesh]
+        proof = None if thickness is None else self._certificates[mesh]
         inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None
         if inertia is not None and inertia.note:
             self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
-        return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia)
+        return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia, proof)
+
+    def _shape(self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body) -> None:
+        strategy, log, cache = self._options.collision, self._log, self._cache
+        shape = collision_shape(mesh, analysis, strategy, thickness, log, body.filename, body.span, cache)
+        self._shapes[mesh] = shape
+        self._certificates[mesh] = proof = certificate(shape, thickness, cache, log)
+        if shape.strategy == "coacd":
+            hint = "collision='auto' collides the true shape"
+            log.info("GEO263", body.filename, f"{shape.note}: {proof}", hint=hint, span=body.span)
 
 
 def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:

@@ -6,12 +6,13 @@ takes the hull of the points that it is given; so MuJoCo is also asked for the v
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from .topology import Floats
+from .topology import Floats, Ints
 
 
 def hull_volume(points: Floats) -> float:
@@ -36,23 +37,35 @@ def hull_volume(points: Floats) -> float:
     return float(spec.compile().body_mass[1]) * size**3
 
 
-def hull_triangles(points: Floats) -> Floats:
-    """Return the triangles of the convex hull of points that are not coplanar, (m, 3, 3), as MuJoCo collides it.
+def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
+    """Return the triangles of the convex hull of each point set, (m, 3) indices, counter-clockwise from outside.
 
-    Corners are those of `points` in full precision, though MuJoCo's qhull saw them as float32.
+    Computed by MuJoCo's qhull from float32 vertices: a corner that is lower than that over its neighbours may be left
+    out.
+
+    Raises:
+        ValueError: Some points are (nearly) coplanar.
     """
     mujoco: Any = import_module("mujoco")
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    size = float(np.ptp(points, axis=0).max())
     spec = mujoco.MjSpec()
-    local = (points - middle) / size
-    spec.add_mesh(name="hull", uservert=local.ravel())
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
+    for i, points in enumerate(clouds):
+        size = float(np.ptp(points, axis=0).max()) or 1.0
+        local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
+        spec.add_mesh(name=str(i), uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=str(i))
     model = spec.compile()
-    graph, turn = model.mesh_graph, np.zeros(9)
-    corners, faces = int(graph[0]), int(graph[1])
-    triangles = graph[2 + 3 * corners + 3 * faces :][: 3 * faces].reshape(-1, 3)
-    mujoco.mju_quat2Mat(turn, model.mesh_quat[0])
-    seen = model.mesh_vert.astype(np.float64) @ turn.reshape(3, 3).T + model.mesh_pos[0]
-    source = np.array([int(np.argmin(np.linalg.norm(local - v, axis=1))) for v in seen])
-    return points[source[triangles]]
+    out: list[Ints] = []
+    for i, points in enumerate(clouds):
+        start, count = model.mesh_faceadr[i], model.mesh_facenum[i]
+        faces = model.mesh_face[start : start + count].astype(np.int64)
+        corners = points[faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inward = np.einsum("ij,ij->i", normals, corners[:, 0] - points[np.unique(faces)].mean(axis=0)) < 0
+        faces[inward] = faces[inward, ::-1]
+        out.append(faces)
+    return out
+
+
+def hull_triangles(points: Floats) -> Floats:
+    """Return the triangles of the convex hull of points that are not coplanar, (m, 3, 3); see `hull_faces`."""
+    return points[hull_faces([points])[0]]

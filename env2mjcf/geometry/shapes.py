@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
+from .cache import GeometryCache
 from .convexity import is_convex
+from .decompose import DecompositionError, approximate_parts
 from .hull import hull_volume
 from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, prisms
-from .polygons import convex_polygons
+from .polygons import Polygon, convex_polygons
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
+
+# Triangles above which reading a file is quicker than computing its content.
+_WORTH_KEEPING = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +32,7 @@ class CollisionShape:
 
     Attributes:
         mesh: The mesh.
-        strategy: What was applied: "hull", or "surface" if any part is collided as a surface.
+        strategy: What was applied: "hull", "coacd", or "surface" if any part is collided as a surface.
         pieces: Convex pieces whose union collides.
         needs_containment: Some closed part is represented by its surface only, and its inside counts as collision:
             the caller must test that separately.
@@ -52,6 +58,7 @@ def collision_shape(
     log: DiagnosticLog,
     subject: str = "",
     span: Span | None = None,
+    cache: GeometryCache | None = None,
 ) -> CollisionShape:
     """Choose the convex pieces that stand for a mesh in collision.
 
@@ -63,11 +70,12 @@ def collision_shape(
         log: Takes a finding where the pieces are not faithful.
         subject: What the findings are about; the mesh's name if empty.
         span: Where the mesh is named in the source.
+        cache: Where results are kept between runs, if they are.
 
     Raises:
-        GeometryError: The mesh is a point or a line (GEO231), or too small for MuJoCo (GEO241).
-        NotImplementedError: The strategy is "solid" or "coacd".
-        ValueError: The thickness is not positive, or the strategy is unknown.
+        GeometryError: The mesh is a point or a line (GEO231), too small for MuJoCo (GEO241), or CoACD fails (GEO262).
+        NotImplementedError: The strategy is "solid".
+        ValueError: The thickness is not positive, the strategy is unknown, or its package is not installed.
     """
     if not 0 < thickness < np.inf:
         raise ValueError(f"thickness must be a positive length, got {thickness!r}")
@@ -77,7 +85,22 @@ def collision_shape(
         raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, (*_STRATEGIES, *_LATER)))}")
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject or mesh.name, span)
-    shape = _STRATEGIES[strategy](mesh, analysis, thickness)
+    build = partial(_STRATEGIES[strategy], mesh, analysis, thickness)
+    try:
+        if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
+            shape = cache.remember(
+                ("shape", mesh.digest, strategy, thickness),
+                build,
+                kinds=(CollisionShape, ConvexPiece, Polygon),
+                known={"mesh": mesh, "analysis": analysis},
+                log=log,
+                subject=subject or mesh.name,
+            )
+        else:
+            shape = build()
+    except DecompositionError as error:
+        hint = "collision='auto' collides the true shape, without CoACD"
+        log.fail(GeometryError, "GEO262", subject or mesh.name, f"{mesh.name}: {error}", hint=hint, span=span)
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
         log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
@@ -154,6 +177,18 @@ def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
     return replace(_with_prisms(mesh, analysis, rest, thickness, hulls), needs_containment=True)
 
 
+def _coacd(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+    if analysis.convex:
+        return _hull(mesh, analysis, thickness)
+    if analysis.flat:
+        return _surface(mesh, analysis, thickness)
+    parts = approximate_parts(analysis.vertices, analysis.faces)
+    pieces = tuple(hull_piece(part, thickness) for part in parts)
+    return CollisionShape(
+        mesh, "coacd", pieces, False, analysis, f"{_count(len(pieces), 'convex part')} by CoACD, approximately"
+    )
+
+
 def _convex_solids(analysis: Analysis) -> Bools:
     """Tell which components are convex solids without a cavity in them, (c,).
 
@@ -190,8 +225,8 @@ _STRATEGIES: dict[str, Callable[[Mesh, Analysis, float], CollisionShape]] = {
     "auto": _auto,
     "hull": _hull,
     "surface": _surface,
+    "coacd": _coacd,
 }
 _LATER = {
     "solid": "use collision='auto', which tests the inside of closed meshes separately",
-    "coacd": "use collision='auto' for exact contact, or collision='hull' for speed",
 }

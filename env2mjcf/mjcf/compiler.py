@@ -82,6 +82,8 @@ def _header(assembly: Assembly, options: Options) -> str:
         if part.shape is not None and part.mesh.digest not in seen:
             seen.add(part.mesh.digest)
             lines.append(f"{part.body.filename}: {part.shape.note}")
+            if part.certificate is not None:
+                lines.append(f"  {part.certificate}")
     return f"<!--{comment_text(lines)}-->"
 
 

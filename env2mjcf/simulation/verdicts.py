@@ -9,8 +9,8 @@ import numpy as np
 
 from ..contact.boundary import BoundaryTest
 from ..contact.types import Contact
-from ..simulation.scene import Scene
 from ..transforms import Array
+from .scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +21,9 @@ class BrokenLimit:
     value: float
     lower: float
     upper: float
+
+    def __str__(self) -> str:
+        return f"{self.name} is {self.value:.6g}; limits {self.lower:.6g} to {self.upper:.6g}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +47,18 @@ class Verdict:
     limits: tuple[BrokenLimit, ...] = ()
     outside: tuple[str, ...] = ()
     contacts: tuple[Contact, ...] = field(default=())
+
+    def reasons(self) -> tuple[str, ...]:
+        """Return a line on everything that is wrong: who touches, where and how deep; limits; the boundary."""
+        outside = (f"outside: {', '.join(self.outside)}",) if self.outside else ()
+        return (*map(touch, self.contacts), *map(str, self.limits), *outside)
+
+
+def touch(contact: Contact) -> str:
+    """Return a line on who touches whom, where and how deep."""
+    place = ", ".join(f"{x:.6g}" for x in contact.position)
+    depth = f"{-contact.distance:.3g} m deep" if contact.distance < 0 else "touching"
+    return f"{contact.link} and {contact.other} ({contact.kind}): {depth} at ({place})"
 
 
 class Judge:

@@ -1,0 +1,56 @@
+"""`env2mjcf cache`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from tyro.conf import Positional
+
+from .arguments import Output, OutputFlags
+from .printing import one_line, print_json
+
+
+@dataclass(frozen=True, slots=True)
+class Cache:
+    """Say what the geometry cache holds, or empty it.
+
+    The cache keeps convex pieces of meshes between runs. Its folder is that of the platform, or the one that
+    ENV2MJCF_CACHE_DIR names; convert, info, check and lint leave it alone with --no-cache.
+
+    Examples:
+      env2mjcf cache info
+      env2mjcf cache clear
+
+    Attributes:
+        action: What to do.
+        output: How to report.
+    """
+
+    action: Annotated[Literal["info", "clear"], Positional]
+    output: OutputFlags = field(default_factory=Output)
+
+    def run(self) -> int:
+        """Do it."""
+        from ..geometry.cache import GeometryCache, default_folder
+
+        cache = GeometryCache(default_folder())
+        before = cache.state()
+        if self.action == "clear":
+            try:
+                cache.clear()
+            except OSError as error:
+                print(f"env2mjcf: cache: {one_line(str(error))}", file=sys.stderr)
+                return 3
+        if self.output.json:
+            print_json(before if self.action == "info" else {"folder": before.folder, "removed": before.entries})
+            return 0
+        folder = one_line(os.fspath(before.folder)) if before.folder else "none: there is no home folder"
+        size = f"{before.entries} entries, {before.bytes / 2**20:.1f} MiB"
+        if self.action == "clear":
+            print(f"removed {size} from {folder}")
+        else:
+            print(f"folder  {folder}\nholds   {size}\nlimit   {before.limit / 2**20:.0f} MiB")
+        return 0

@@ -1,0 +1,225 @@
+"""How far the convex pieces of a mesh are from the mesh itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ..errors import DiagnosticLog
+from .cache import GeometryCache
+from .distance import distances, spread
+from .hull import hull_faces, hull_volume
+from .orientation import winding_numbers
+from .shapes import CollisionShape
+from .topology import Bools, Floats, Ints
+
+APPROXIMATE = ("hull", "coacd")
+"""Strategies whose verdicts may be wrong by more than the tolerance of contact."""
+
+_SURFACE_POINTS = 3000
+_LATTICE_POINTS = 4096
+_LEAST_LATTICE = 1000
+_WORK = 1_000_000  # pairs of lattice points and triangles
+# Each lattice point lies elsewhere in its cell, so that counts are not all wrong by the same part of a cell: Roberts,
+# "The unreasonable effectiveness of quasirandom sequences", 2018.
+_STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
+_BATCH = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """The difference between a mesh and what collides for it.
+
+    Attributes:
+        exact: Pieces and mesh differ by no more than `band`, by construction; else the numbers below are sampled.
+        volume_added: Volume that collides and is not in the mesh, cubic metres; None where that has no meaning.
+        volume_lost: Volume of the mesh that does not collide; None for a surface, which has none.
+        reach_added: Greatest distance, metres, from the mesh of a point that collides: what is farther than this from
+            the mesh is never called a collision on its account.
+        reach_lost: Greatest distance from the pieces of a point of the mesh: what reaches deeper than this into it is
+            always called a collision.
+        band: Verdicts are certain where other bodies stay farther than this from the surface, on either side, metres.
+        samples: Number of points on vertices, edges and faces and inside that were measured; 0: none was needed.
+        gap: Greatest distance, metres, of any point from a sample: what is smaller may have been passed over.
+        fraction_added, fraction_lost: The volumes in units of the mesh's volume; None for a surface.
+    """
+
+    exact: bool
+    volume_added: float | None
+    volume_lost: float | None
+    reach_added: float
+    reach_lost: float
+    band: float
+    samples: int = 0
+    gap: float = 0.0
+    fraction_added: float | None = None
+    fraction_lost: float | None = None
+
+    def __str__(self) -> str:
+        if self.exact:
+            inside = "what lies wholly inside is called free; " if self.volume_lost else ""
+            return f"{inside}verdicts are certain beyond {self.band:.2g} m of its surface"
+        claims = (
+            f"claims {_much(self.fraction_added, self.volume_added)}, up to {self.reach_added:.3g} m off the mesh: "
+            "free configurations there are called collisions"
+            if self.reach_added > 0
+            else "claims nothing that is not the mesh"
+        )
+        misses = (
+            f"misses {_much(self.fraction_lost, self.volume_lost)}, up to {self.reach_lost:.3g} m deep: "
+            "collisions there are called free"
+            if self.reach_lost > 0
+            else "misses no collision"
+        )
+        how = f"sampled at {self.samples} points on vertices, edges, faces and inside, {self.gap:.2g} m apart at most"
+        return f"{claims}; {misses}; verdicts are certain beyond {self.band:.3g} m of its surface ({how})"
+
+
+def _much(fraction: float | None, volume: float | None) -> str:
+    if fraction is not None and fraction < 1e-3:
+        return "less than 0.1 % of its volume"
+    if fraction is not None:
+        return f"{100 * fraction:.3g} % of its volume"
+    return "some space" if volume is None else f"{volume:.3g} m3"
+
+
+def certificate(
+    shape: CollisionShape, thickness: float, cache: GeometryCache | None, log: DiagnosticLog
+) -> Certificate:
+    """Return `certify(shape, thickness)`, from the cache if it is there."""
+    build = partial(certify, shape, thickness)
+    if cache is None or shape.strategy not in APPROXIMATE or shape.analysis.convex:
+        return build()
+    what = ("certificate", shape.mesh.digest, shape.strategy, len(shape.pieces), thickness)
+    return cache.remember(what, build, kinds=(Certificate,), known={}, log=log, subject=shape.mesh.name)
+
+
+def certify(shape: CollisionShape, thickness: float) -> Certificate:
+    """Compare the pieces of a shape with its mesh.
+
+    Faithful strategies are exact by construction: no piece leaves the surface by more than the thickness, and what
+    they lose of a solid's inside is tested separately. The others are measured: points on all vertices, edges and
+    faces, and a lattice of points inside, the same on every run.
+
+    Args:
+        shape: The shape.
+        thickness: That it was made with.
+    """
+    analysis = shape.analysis
+    if shape.strategy not in APPROXIMATE or analysis.convex or _exact_parts(shape):
+        surface = shape.strategy == "surface" and not shape.needs_containment
+        lost = analysis.volume if surface and analysis.solid else 0.0
+        return Certificate(True, 0.0, lost, thickness, thickness, thickness, 0, 0.0, 0.0, 1.0 if lost else 0.0)
+    return _measured(shape, thickness)
+
+
+def _exact_parts(shape: CollisionShape) -> bool:
+    """Tell whether each component is convex and has a hull of its own, as `auto` makes them."""
+    return shape.strategy == "hull" and len(shape.pieces) == shape.analysis.components > 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
+    """The convex pieces: corners and triangles of all, and the planes of each."""
+
+    vertices: Floats
+    faces: Ints
+    planes: tuple[tuple[Floats, Floats], ...]
+
+    def inside(self, points: Floats) -> Bools:
+        """Tell which points lie in any piece, (k,)."""
+        out = np.zeros(len(points), dtype=np.bool_)
+        for normals, offsets in self.planes:
+            out |= (points @ normals.T <= offsets).all(axis=1)
+        return out
+
+
+def _pieces(shape: CollisionShape) -> _Pieces:
+    clouds = [piece.vertices + piece.center for piece in shape.pieces]
+    faces = hull_faces([piece.vertices for piece in shape.pieces])
+    planes: list[tuple[Floats, Floats]] = []
+    for cloud, own in zip(clouds, faces, strict=True):
+        corners = cloud[own]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normals, axis=1)
+        normals = normals[length > 0] / length[length > 0, None]
+        # The farthest corner, so that float32 in the hull lets no point of the cloud out.
+        planes.append((normals, (normals @ cloud.T).max(axis=1)))
+    starts = np.cumsum([0, *(len(c) for c in clouds)])
+    joined = np.concatenate([own + start for own, start in zip(faces, starts, strict=False)])
+    return _Pieces(np.concatenate(clouds), joined, tuple(planes))
+
+
+def _measured(shape: CollisionShape, thickness: float) -> Certificate:
+    analysis, pieces = shape.analysis, _pieces(shape)
+    vertices, faces = analysis.vertices, analysis.faces
+    lattice, cell, gap = _lattice(pieces.vertices, vertices, len(faces))
+    claimed = pieces.inside(lattice)
+    owned = _in_solid(lattice, shape)
+    on_pieces, gap_pieces = spread(pieces.vertices, pieces.faces, _SURFACE_POINTS)
+    beyond = np.concatenate([on_pieces, lattice[claimed & ~owned]])
+    reach_added = _reach(beyond, distances(beyond, vertices, faces), lambda p: _in_solid(p, shape))
+    samples, gap = len(on_pieces) + len(lattice), max(gap, gap_pieces)
+    added, lost, reach_lost = float((claimed & ~owned).sum() * cell), float((owned & ~claimed).sum() * cell), 0.0
+    if shape.strategy == "hull":  # it holds all of the mesh
+        lost = 0.0
+        if analysis.solid and analysis.components == 1:
+            added = max(0.0, hull_volume(vertices) - analysis.volume)
+    else:
+        on_mesh, gap_mesh = spread(vertices, faces, _SURFACE_POINTS)
+        under = np.concatenate([on_mesh, lattice[owned & ~claimed]])
+        reach_lost = _reach(under, distances(under, pieces.vertices, pieces.faces), pieces.inside)
+        samples, gap = samples + len(on_mesh), max(gap, gap_mesh)
+    volume = analysis.volume if analysis.components == 1 else float(owned.sum() * cell)
+    solid = analysis.solid and volume > 0
+    reach_added, reach_lost = (_beyond_rounding(r, analysis.diagonal) for r in (reach_added, reach_lost))
+    return Certificate(
+        exact=False,
+        volume_added=added,
+        volume_lost=lost if solid else None,
+        reach_added=reach_added,
+        reach_lost=reach_lost,
+        band=max(reach_added, reach_lost, thickness),
+        samples=samples,
+        gap=gap,
+        fraction_added=added / volume if solid else None,
+        fraction_lost=lost / volume if solid else None,
+    )
+
+
+def _beyond_rounding(length: float, diagonal: float) -> float:
+    """Return 0 for what float32, in which MuJoCo keeps corners, cannot tell from it."""
+    return length if length > 1e-6 * diagonal else 0.0
+
+
+def _lattice(first: Floats, second: Floats, triangles: int) -> tuple[Floats, float, float]:
+    """Return points that fill the box around both point sets, the volume of each one's cell, and their greatest gap."""
+    points = np.concatenate([first, second])
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    count = max(_LEAST_LATTICE, min(_LATTICE_POINTS, _WORK // max(1, triangles)))
+    width = float(np.prod(np.maximum(size, 1e-3 * size.max())) / count) ** (1 / 3)
+    cuts = np.maximum(1, np.ceil(size / width)).astype(np.int64)
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in cuts), indexing="ij"), axis=-1).reshape(-1, 3)
+    places = (cells + ((np.arange(len(cells))[:, None] + 0.5) * _STEPS) % 1.0) / cuts
+    return low + size * places, float(np.prod(size / cuts)), float(np.linalg.norm(size / cuts))
+
+
+def _in_solid(points: Floats, shape: CollisionShape) -> Bools:
+    analysis = shape.analysis
+    if not analysis.solid:
+        return np.zeros(len(points), dtype=np.bool_)
+    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5
+
+
+def _reach(points: Floats, apart: Floats, inside: Callable[[Floats], Bools]) -> float:
+    """Return the greatest of the distances of points that are not inside; the farthest are asked first."""
+    order = np.argsort(-apart, kind="stable")
+    for i in range(0, len(order), _BATCH):
+        some = order[i : i + _BATCH]
+        out = ~inside(points[some])
+        if out.any():
+            return float(apart[some[np.argmax(out)]])
+    return 0.0
