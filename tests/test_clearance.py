@@ -12,6 +12,7 @@ from test_scene import notched_block
 from truth import surface_distances
 
 import env2mjcf
+from env2mjcf.contact.certificate import certified
 
 FLYER = "1\nsmall.g Volumetric Rotational\nConnections\n0\n"
 
@@ -211,3 +212,13 @@ def test_a_certified_edge_has_no_collision_at_fine_steps(name: str) -> None:
             way = scene.space.interpolate(q, end, 3000)
             assert scene.clearance(way).min() < 1e-3 * scene.extent
     assert proved
+
+
+@pytest.mark.parametrize("motion", [1.0, 4.0])
+def test_no_stretch_is_passed_over_however_thin_the_obstacle(motion: float) -> None:
+    """A point on a line, and an obstacle as thin as a hair anywhere on its way."""
+    start, delta = np.zeros(1), np.array([motion])
+    for place in np.linspace(0.01, 0.99, 197) * motion:
+        hit = certified(lambda rows, place=place: np.abs(rows[:, 0] - place) - 1e-4, start, delta, motion, 1e-6)
+        assert not hit
+        assert certified(lambda rows, place=place: np.hypot(rows[:, 0] - place, 0.01), start, delta, motion, 1e-6)

@@ -228,7 +228,7 @@ class Scene:
     ) -> Any:
         """Return the least distance over the tested pairs, in metres; the boundary is not counted.
 
-        Free: the distance of the triangles, exact but for rounding (1e-12 of the extent); +inf without pairs.
+        Free: the distance of the triangles, exact but for rounding; +inf without pairs.
         In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
         of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
         the shortest translation that does. For two convex bodies of few faces it is that translation (for many faces,
