@@ -48,6 +48,7 @@ CATALOGUE: dict[str, str] = {
     "GEO239": "Edges of a mesh have more than two faces.",
     "GEO240": "A mesh that is not convex collides as its convex hull, by choice.",
     "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
+    "GEO242": "Vertices lay on edges of other faces (T-junctions); those faces were cut there.",
     "GEO243": "A mesh without inside collides as a surface, though it was to be solid.",
     # Bodies and connections.
     # What is written for MuJoCo.
