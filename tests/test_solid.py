@@ -94,6 +94,19 @@ MODEL_MESHES = [
 ]  # fmt: skip
 
 
+def crossing_prism(seed: int) -> Mesh:
+    """A prism whose outline crosses itself: some parts of it are wound the wrong way round, some twice."""
+    outline = np.random.default_rng(seed).normal(size=(7, 2))
+    n = len(outline)
+    middle = outline.mean(axis=0)
+    levels = [np.column_stack([outline, np.full(n, z)]) for z in (0.0, 0.3)]
+    vertices = np.vstack([*levels, [[*middle, 0.0], [*middle, 0.3]]])
+    i, j = np.arange(n), (np.arange(n) + 1) % n
+    sides = np.concatenate([np.stack([i, j, j + n], 1), np.stack([i, j + n, i + n], 1)])
+    caps = np.concatenate([np.stack([j, i, np.full(n, 2 * n)], 1), np.stack([i + n, j + n, np.full(n, 2 * n + 1)], 1)])
+    return Mesh.from_arrays("crossing", vertices, np.concatenate([sides, caps]))
+
+
 def loaded(path: Path) -> Mesh:
     return load_mesh(path, DiagnosticLog(), Limits())
 
@@ -176,6 +189,26 @@ def assert_same_outline(found: np.ndarray, corners: np.ndarray, normal: np.ndarr
 def test_cells_stay_inside_and_cover_the_surface(name: str) -> None:
     thin = name == "thinner than a pin"
     assert_inside_and_covering(MESHES[name], pinned=4 if thin else 0)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        *(crossing_prism(seed) for seed in range(4)),
+        of_trimesh("spindle", trimesh.creation.torus(0.3, 1.0, 16, 12)),
+        joined(box((4, 4, 4)), turned(box((2, 2, 2), (1, 0, 0)))),
+    ],
+    ids=["crossing 0", "crossing 1", "crossing 2", "crossing 3", "spindle", "cavity at the surface"],
+)
+def test_a_surface_that_crosses_or_touches_itself_has_no_cell_outside(mesh: Mesh) -> None:
+    """Where no cell has room, or none is right, thin prisms stand on the surface."""
+    shape, pieces = lined(mesh)
+    a = shape.analysis
+    cells = [p for p in pieces if height(shape, p) > 1.5 * PIN * a.diagonal]
+    assert sum(len(p.polygon.faces) for p in pieces) == len(a.faces)
+    points = np.concatenate([p.center + 0.999 * p.vertices for p in cells])
+    assert (np.abs(winding_numbers(points, a.vertices, a.faces)) > 0.5).all()
+    assert_compiles(shape)
 
 
 @pytest.mark.parametrize("name", MODEL_MESHES)

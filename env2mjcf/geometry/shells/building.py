@@ -11,8 +11,8 @@ from ..pieces import SLENDEREST, ConvexPiece, prisms, too_narrow
 from ..polygons import Polygon, convex_polygons
 from ..topology import Ints
 from .corners import cell_corners
+from .doubts import doubtful_polygons
 from .pairing import pair_sides
-from .reversal import reversed_polygons
 from .thickness import fit
 from .walls import Group, groups
 
@@ -37,7 +37,7 @@ class Shells:
         pinned: How many are thin prisms, because there is no room for a cell.
         tilted: How many cells lean further than their edges ask for, to make way for another part of the surface.
         thinnest: Height of the lowest piece.
-        volume: Of all pieces together; where they overlap it counts once for each.
+        volume: Of all cells together; where they overlap it counts once for each.
         missing: Polygons that are too small for MuJoCo.
     """
 
@@ -67,23 +67,29 @@ def shells(analysis: Analysis, faces: Ints, thickness: float) -> Shells:
     solid = np.where(analysis.component_volumes > 0, np.arange(analysis.components), -1)[analysis.component]
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
     found: list[ConvexPiece | None] = [None] * len(polygons)
-    heights, tilted, volume = [float("inf")], 0, 0.0
+    # Height, volume, and whether a side is tilted.
+    measures = np.zeros((len(polygons), 3))
     for group in groups(vertices, chosen, polygons, sides.slopes, THICKEST * analysis.diagonal):
         fit(group, vertices[analysis.faces], solid, of_polygon[group.members], nothing)
-        for row, piece, height, room in _cells(group, polygons, analysis, thickness):
-            found[group.members[row]] = piece
-            heights.append(height)
-            volume += room
-            tilted += int(group.tilted[row])
-    turned = reversed_polygons(analysis, polygons, found, sides, thickness)
-    bare = sorted({i for i, piece in enumerate(found) if piece is None} | set(turned))
-    standing = [turned.get(i, polygons[i]) for i in bare]
+        for row, piece, height, volume in _cells(group, polygons, analysis, thickness):
+            number = int(group.members[row])
+            found[number] = piece
+            measures[number] = height, volume, group.tilted[row]
+    doubtful = doubtful_polygons(analysis, polygons, found, sides, thickness)
+    bare, standing = list(doubtful), list(doubtful.values())
     pins = {id(p.polygon): p for p in prisms(vertices, standing, thickness, inward=True)}
     for i, polygon in zip(bare, standing, strict=True):
         found[i] = pins.get(id(polygon))
-    pieces = tuple(piece for piece in found if piece is not None)
     missing = tuple(polygons[i] for i in bare if found[i] is None)
-    return Shells(pieces, len(pins), tilted, min([*heights, *([thickness] if pins else [])]), volume, missing)
+    measures[bare] = thickness, 0.0, 0.0
+    return Shells(
+        pieces=tuple(piece for piece in found if piece is not None),
+        pinned=len(pins),
+        tilted=int(measures[:, 2].sum()),
+        thinnest=float(measures[:, 0].min()),
+        volume=float(measures[:, 1].sum()),
+        missing=missing,
+    )
 
 
 def _cells(

@@ -154,7 +154,7 @@ def _replace_by_frustums(
     limits = np.divide(group.reach, group.slopes, out=np.full(group.slopes.shape, np.inf), where=group.slopes > 0)
     limit = limits.min(axis=1)[rows]
     depth = np.minimum(group.height[rows], limit / 2)
-    scale = 1 - depth / limit
+    scale = 1 - np.divide(depth, limit, out=np.ones_like(limit), where=limit > 0)
     top = group.corners[rows]
     points[rows], used[rows] = 0.0, False
     points[rows, :k], points[rows, k : 2 * k] = (

@@ -1,4 +1,4 @@
-"""Polygons of a folded surface whose normals point into the solid."""
+"""Polygons of a folded or crossing surface under which there is no solid."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from ..topology import Floats, Ints, connected
 from .pairing import Sides
 
 
-def reversed_polygons(
+def doubtful_polygons(
     analysis: Analysis,
     polygons: Sequence[Polygon],
     cells: Sequence[ConvexPiece | None],
     sides: Sides,
     thickness: float,
 ) -> dict[int, Polygon]:
-    """Return the polygons that have the solid on their outer side, turned round, by number.
+    """Return the polygons that no cell may stand for, by number; turned round where the solid is on the other side.
 
-    Such are the parts of a flat cap that is folded over itself: covered twice one way, and once the other. Without
-    a fold all cells that are linked side to side are inside or outside together, because no face passes through a
-    cell: one of them is asked. With one, every cell is asked.
+    Such are the parts of a flat cap that is folded over itself: covered twice one way, and once the other. In a
+    surface without folds and crossings all cells that are linked side to side are inside or outside together,
+    because no face passes through a cell: one of them is asked. Else every cell is asked.
 
     Args:
         analysis: The mesh.
@@ -35,7 +35,9 @@ def reversed_polygons(
         sides: How faces are paired at their edges.
         thickness: Depth at which polygons without a cell are asked.
     """
-    patch = np.arange(len(polygons)) if sides.folded else _patches(polygons, cells, sides.links)
+    # A surface that passes through itself leaves no room for some cell.
+    suspect = sides.folded or any(cell is None for cell in cells)
+    patch = np.arange(len(polygons)) if suspect else _patches(polygons, cells, sides.links)
     asked = np.array([i for i, cell in enumerate(cells) if cell is not None], dtype=np.int64)
     asked = asked[np.unique(patch[asked], return_index=True)[1]]
     insides = [cell.center for i in asked if (cell := cells[i]) is not None]
@@ -45,9 +47,8 @@ def reversed_polygons(
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
     turn = ~_inside(analysis, middles - step) & _inside(analysis, middles + step)
     return {
-        i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal)
+        i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal) if t else polygons[i]
         for i, t in zip(doubtful, turn.tolist(), strict=True)
-        if t
     }
 
 
@@ -63,4 +64,4 @@ def _patches(polygons: Sequence[Polygon], cells: Sequence[ConvexPiece | None], l
 
 
 def _inside(analysis: Analysis, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return winding_numbers(points, analysis.vertices, analysis.faces) > 0.5
+    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5
