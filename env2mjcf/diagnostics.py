@@ -127,6 +127,8 @@ CATALOGUE: dict[str, str] = {
     "GEO261": "The geometry cache cannot be read or written; everything is computed.",
     "GEO262": "CoACD crashed, hung, or gave no parts.",
     "GEO263": "A mesh that is not convex collides as approximate parts, by choice.",
+    "GEO242": "Vertices lay on edges of other faces (T-junctions); those faces were cut there.",
+    "GEO243": "A mesh without inside collides as a surface, though it was to be solid.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
     "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",

@@ -21,8 +21,8 @@ from .formats.reading import read_scene
 from .formats.robot import read_robot
 from .formats.source import read_source
 from .formats.xml import parse_xml
-from .geometry.analysis import analyse, mesh_diagnostics
 from .geometry.loading import READABLE, load_mesh
+from .geometry.repair import repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
 from .kinematics import RobotKinematics
 from .model import Body, Environment, MultiBody, MultiBodyKind
@@ -208,4 +208,4 @@ def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
 def _lint_mesh(path: Path, options: Options, log: DiagnosticLog, body: Body | None = None) -> None:
     mesh = load_mesh(path, log, options.limits)
     subject, span = (body.filename, body.span) if body else (str(path), None)
-    mesh_diagnostics(mesh, analyse(mesh), log, subject=subject, span=span)
+    repair_diagnostics(mesh, repaired(mesh), log, subject=subject, span=span)

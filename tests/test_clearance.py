@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from distances import surface_distances
 from real_scenes import real_scene, scene_names
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from test_scene import notched_block
-from truth import surface_distances
 
 import env2mjcf
 from env2mjcf.contact.certificate import certified

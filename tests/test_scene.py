@@ -216,7 +216,7 @@ def test_ground_and_walls_act_in_simulation_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("options", "value"),
-    [({"collision": "solid"}, "solid"), ({"engine": "exact"}, "exact")],
+    [({"engine": "exact"}, "exact")],
 )
 def test_what_is_not_there_yet_says_so(options: dict[str, str], value: str) -> None:
     with pytest.raises(NotImplementedError, match=value):

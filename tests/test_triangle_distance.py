@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from distances import coal_distance, coal_model, fcl_distance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from truth import coal_distance, coal_model, fcl_distance
 
 from env2mjcf.geometry.hull import hull_triangles, hull_volume
 from env2mjcf.geometry.triangle_distance import nearest

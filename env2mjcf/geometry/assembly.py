@@ -14,12 +14,13 @@ from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
 from ..options import Options
 from ..transforms import Array
-from .analysis import Analysis, analyse, mesh_diagnostics
+from .analysis import Analysis
 from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .loading import load_mesh
 from .mesh import Mesh
+from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 
@@ -197,8 +198,9 @@ class _Meshes:
         """Give a placed body its shape (none without a thickness) and its inertia (where it moves)."""
         mesh, body, options = placed.mesh, placed.body, self._options
         if mesh not in self._analyses:
-            self._analyses[mesh] = analyse(mesh)
-            mesh_diagnostics(mesh, self._analyses[mesh], self._log, body.filename, body.span)
+            result = repaired(mesh)
+            self._analyses[mesh] = result.analysis
+            repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis = self._analyses[mesh]
         if thickness is not None and mesh not in self._shapes:
             self._shape(mesh, analysis, thickness, body)

@@ -235,7 +235,7 @@ def entry_key(*what: object) -> str:
 def _provenance() -> str:
     """Say who computes: the text of the geometry code itself, so that no version number is ever forgotten."""
     code = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         code.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return " ".join([code.hexdigest(), platform.machine(), *(f"{n}={_version(n)}" for n in ("env2mjcf", *_LIBRARIES))])
 

@@ -67,10 +67,10 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         Prisms in the order of the polygons. One of a polygon too narrow for MuJoCo is widened, by less than
         `thickness`; one that is still too small is left out.
     """
-    loops = _corner_loops(vertices, polygons)
+    loops = corner_loops(vertices, polygons)
     out: list[ConvexPiece | None] = [None] * len(polygons)
     below, above = (-thickness, 0.0) if inward else (-thickness / 2, thickness / 2)
-    for members in _by_length(loops):
+    for members in by_length(loops):
         corners = vertices[np.array([loops[i] for i in members])]  # (g, k, 3)
         normals = np.array([polygons[i].normal for i in members])
         centers = corners.mean(axis=1)
@@ -79,7 +79,7 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         points = (local[:, None] + shift[:, :, None]).reshape(len(members), -1, 3)
         points.setflags(write=False)
         centers.setflags(write=False)
-        narrow, surfaces = _too_narrow(local, normals, thickness), _surfaces(local, thickness)
+        narrow, surfaces = too_narrow(local, normals, thickness), _surfaces(local, thickness)
         for row, i in enumerate(members):
             if narrow[row]:
                 rectangle = _widened(local[row], normals[row], thickness)
@@ -91,10 +91,10 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
     return tuple(piece for piece in out if piece is not None)
 
 
-def _corner_loops(vertices: Floats, polygons: Sequence[Polygon]) -> list[tuple[int, ...]]:
+def corner_loops(vertices: Floats, polygons: Sequence[Polygon]) -> list[tuple[int, ...]]:
     """Return the loops without vertices at which they go straight on: the hull does not need those."""
     out = [polygon.loop for polygon in polygons]
-    for members in _by_length(out):
+    for members in by_length(out):
         if len(out[members[0]]) == 3:
             continue
         points = vertices[np.array([out[i] for i in members])]
@@ -112,7 +112,8 @@ def _corner_loops(vertices: Floats, polygons: Sequence[Polygon]) -> list[tuple[i
     return out
 
 
-def _by_length(loops: Sequence[tuple[int, ...]]) -> list[list[int]]:
+def by_length(loops: Sequence[tuple[int, ...]]) -> list[list[int]]:
+    """Group the positions of loops with equally many corners, in order of each group's first."""
     groups: dict[int, list[int]] = {}
     for i, loop in enumerate(loops):
         groups.setdefault(len(loop), []).append(i)
@@ -145,7 +146,8 @@ def _across(local: Floats, normals: Floats) -> Floats:
     return np.einsum("gej,gvj->gev", inside, local) - np.einsum("gej,gej->ge", inside, local)[:, :, None]
 
 
-def _too_narrow(local: Floats, normals: Floats, thickness: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def too_narrow(local: Floats, normals: Floats, thickness: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Tell which polygons (g, k, 3) MuJoCo cannot hold as they are, (g,)."""
     # A convex polygon is narrowest square to one of its edges.
     out = np.empty(len(local), dtype=np.bool_)
     step = max(1, 2_000_000 // local.shape[1] ** 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,6 +18,7 @@ from .hull import hull_volume
 from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, prisms
 from .polygons import Polygon, convex_polygons
+from .shells import Shells, shells
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
@@ -32,10 +33,11 @@ class CollisionShape:
 
     Attributes:
         mesh: The mesh.
-        strategy: What was applied: "hull", "coacd", or "surface" if any part is collided as a surface.
+        strategy: What was applied: "hull"; "coacd"; "solid" if any part is lined with shell cells; "surface" if any
+            part is collided as a surface.
         pieces: Convex pieces whose union collides.
-        needs_containment: Some closed part is represented by its surface only, and its inside counts as collision:
-            the caller must test that separately.
+        needs_containment: The pieces do not fill some closed part, whose inside counts as collision: the caller must
+            test that separately.
         analysis: The mesh's analysis.
         note: One sentence for the report.
         omitted_area: Area of polygons that are too small for MuJoCo.
@@ -66,7 +68,7 @@ def collision_shape(
         mesh: The mesh.
         analysis: `analyse(mesh)`.
         strategy: One of the `collision` option's values.
-        thickness: Height of the prisms that stand for surfaces; no piece leaves the surface by more.
+        thickness: Height of the prisms that stand for surfaces; no piece leaves the surface or solid by more.
         log: Takes a finding where the pieces are not faithful.
         subject: What the findings are about; the mesh's name if empty.
         span: Where the mesh is named in the source.
@@ -74,15 +76,12 @@ def collision_shape(
 
     Raises:
         GeometryError: The mesh is a point or a line (GEO231), too small for MuJoCo (GEO241), or CoACD fails (GEO262).
-        NotImplementedError: The strategy is "solid".
         ValueError: The thickness is not positive, the strategy is unknown, or its package is not installed.
     """
     if not 0 < thickness < np.inf:
         raise ValueError(f"thickness must be a positive length, got {thickness!r}")
-    if strategy in _LATER:
-        raise NotImplementedError(f"collision={strategy!r} is not available yet; {_LATER[strategy]}")
     if strategy not in _STRATEGIES:
-        raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, (*_STRATEGIES, *_LATER)))}")
+        raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, _STRATEGIES))}")
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject or mesh.name, span)
     build = partial(_STRATEGIES[strategy], mesh, analysis, thickness)
@@ -104,6 +103,9 @@ def collision_shape(
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
         log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
+    if strategy == "solid" and not analysis.solid:
+        hint = "close the mesh, or give it a wall thickness, if its inside matters"
+        log.info("GEO243", subject or mesh.name, shape.note, hint=hint, span=span)
     if shape.omitted_area:
         _report_omission(shape, log, subject or mesh.name, span)
     return shape
@@ -135,46 +137,65 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
 
 
 def _surface(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
-    return _with_prisms(mesh, analysis, analysis.faces, thickness)
-
-
-def _with_prisms(
-    mesh: Mesh, analysis: Analysis, faces: Ints, thickness: float, hulls: tuple[ConvexPiece, ...] = ()
-) -> CollisionShape:
+    faces = analysis.faces
     polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
     made = {id(piece.polygon) for piece in pieces}
-    lost = [face for polygon in polygons if id(polygon) not in made for face in polygon.faces]
-    note = f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
     return CollisionShape(
         mesh=mesh,
         strategy="surface",
-        pieces=hulls + pieces,
+        pieces=pieces,
         needs_containment=False,
         analysis=analysis,
-        note=f"{_hulled(hulls)}, {note}" if hulls else note,
-        omitted_area=float(face_areas(analysis.vertices, faces[lost]).sum()) if lost else 0.0,
+        note=f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}",
+        omitted_area=_area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made]),
     )
+
+
+def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float:
+    """Return the area of polygons whose faces are rows of `faces`."""
+    lost = [face for polygon in polygons for face in polygon.faces]
+    return float(face_areas(analysis.vertices, analysis.faces[faces[lost]]).sum()) if lost else 0.0
 
 
 def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
     return f"{_count(len(hulls), 'convex part')} as {'a hull' if len(hulls) == 1 else 'hulls'}"
 
 
-def _auto(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+def _solid(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
     if analysis.convex:
         return _hull(mesh, analysis, thickness)
-    if not analysis.closed:
-        return _surface(mesh, analysis, thickness)
+    if not analysis.solid:
+        shape = _surface(mesh, analysis, thickness)
+        why = "no winding tells its sides apart" if analysis.closed else "the mesh is open and has no inside"
+        return replace(shape, needs_containment=analysis.closed, note=f"{why}: {shape.note}")
     whole = _convex_solids(analysis)
     hulls = tuple(
         hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
         for c in np.flatnonzero(whole)
     )
-    rest = analysis.faces[~whole[analysis.component]]
+    rest = np.flatnonzero(~whole[analysis.component])
     if len(rest) == 0:
         return CollisionShape(mesh, "hull", hulls, False, analysis, _hulled(hulls))
-    return replace(_with_prisms(mesh, analysis, rest, thickness, hulls), needs_containment=True)
+    lining = shells(analysis, rest, thickness)
+    note = _shell_note(lining, analysis.component_volumes[~whole].sum())
+    return CollisionShape(
+        mesh=mesh,
+        strategy="solid",
+        pieces=hulls + lining.pieces,
+        needs_containment=True,
+        analysis=analysis,
+        note=f"{_hulled(hulls)}, {note}" if hulls else note,
+        omitted_area=_area(analysis, rest, lining.missing),
+    )
+
+
+def _shell_note(lining: Shells, volume: float) -> str:
+    pinned = f"{_count(lining.pinned, 'thin prism')} where there is no room" if lining.pinned else "none a thin prism"
+    return (
+        f"{_count(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, "
+        f"thinnest {lining.thinnest:.3g}, {lining.volume / volume:.3g} times the solid's volume"
+    )
 
 
 def _coacd(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
@@ -222,11 +243,9 @@ def _count(n: int, noun: str) -> str:
 
 
 _STRATEGIES: dict[str, Callable[[Mesh, Analysis, float], CollisionShape]] = {
-    "auto": _auto,
+    "auto": _solid,
     "hull": _hull,
+    "solid": _solid,
     "surface": _surface,
     "coacd": _coacd,
-}
-_LATER = {
-    "solid": "use collision='auto', which tests the inside of closed meshes separately",
 }

@@ -1,0 +1,67 @@
+"""Polygons of a folded or crossing surface under which there is no solid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..analysis import Analysis
+from ..orientation import winding_numbers
+from ..pieces import ConvexPiece
+from ..polygons import Polygon
+from ..topology import Floats, Ints, connected
+from .pairing import Sides
+
+
+def doubtful_polygons(
+    analysis: Analysis,
+    polygons: Sequence[Polygon],
+    cells: Sequence[ConvexPiece | None],
+    sides: Sides,
+    thickness: float,
+) -> dict[int, Polygon]:
+    """Return the polygons that no cell may stand for, by number; turned round where the solid is on the other side.
+
+    Such are the parts of a flat cap that is folded over itself: covered twice one way, and once the other. In a
+    surface without folds and crossings all cells that are linked side to side are inside or outside together,
+    because no face passes through a cell: one of them is asked. Else every cell is asked.
+
+    Args:
+        analysis: The mesh.
+        polygons: Of the surface.
+        cells: The cell of each polygon; None where there was no room.
+        sides: How faces are paired at their edges.
+        thickness: Depth at which polygons without a cell are asked.
+    """
+    # A surface that passes through itself leaves no room for some cell.
+    suspect = sides.folded or any(cell is None for cell in cells)
+    patch = np.arange(len(polygons)) if suspect else _patches(polygons, cells, sides.links)
+    asked = np.array([i for i, cell in enumerate(cells) if cell is not None], dtype=np.int64)
+    asked = asked[np.unique(patch[asked], return_index=True)[1]]
+    insides = [cell.center for i in asked if (cell := cells[i]) is not None]
+    wrong = patch[asked[~_inside(analysis, np.reshape(insides, (-1, 3)))]]
+    doubtful = [i for i, cell in enumerate(cells) if cell is None or patch[i] in wrong]
+    middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
+    step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
+    turn = ~_inside(analysis, middles - step) & _inside(analysis, middles + step)
+    return {
+        i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal) if t else polygons[i]
+        for i, t in zip(doubtful, turn.tolist(), strict=True)
+    }
+
+
+def _patches(polygons: Sequence[Polygon], cells: Sequence[ConvexPiece | None], links: Ints) -> Ints:
+    """Label polygons with cells that are linked, (len(polygons),)."""
+    of_face = np.empty(sum(len(p.faces) for p in polygons), dtype=np.int64)
+    for i, polygon in enumerate(polygons):
+        of_face[list(polygon.faces)] = i
+    full = np.array([cell is not None for cell in cells])
+    a, b = of_face[links[:, 0]], of_face[links[:, 1]]
+    both = full[a] & full[b]
+    return connected(len(polygons), a[both], b[both])
+
+
+def _inside(analysis: Analysis, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5

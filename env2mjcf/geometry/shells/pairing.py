@@ -1,0 +1,73 @@
+"""Which two faces bound the solid at an edge, and how the plane between their cells leans."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..topology import Floats, Ints, edges
+
+# Angles in radians below which two faces coincide: the solid that touches here is another one.
+_COINCIDENT = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sides:
+    """What happens at each edge of each face.
+
+    Attributes:
+        slopes: (m, 3) how much the cell of the face must recede per unit of depth.
+        links: (p, 2) pairs of faces that bound the same wedge of the solid at some edge.
+        folded: Whether faces lie upon each other at some edge.
+    """
+
+    slopes: Floats
+    links: Ints
+    folded: bool
+
+
+def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
+    """Find the partner of each face at each of its edges, and the plane that divides the solid between their cells.
+
+    The bisector plane of an edge with interior angle theta recedes by cot(theta / 2); at reflex, flat and open edges
+    the cell goes straight down. Where more than two faces meet, the partner of a face is the first one of opposite
+    direction that a rotation from the face into the solid finds.
+
+    Args:
+        vertices: (n, 3).
+        faces: (m, 3) counter-clockwise from outside.
+        normals: (m, 3) unit normals.
+    """
+    table = edges(faces)
+    corner = np.argsort(table.of_corner.ravel(), kind="stable")
+    start = np.concatenate([[0], np.cumsum(table.faces)[:-1]]).astype(np.int64)
+    along = vertices[faces[:, (1, 2, 0)]] - vertices[faces]
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    inward = np.cross(normals[:, None], along)
+    here, there = _candidates(table.faces, start, corner)
+    opposite = table.forward.ravel()[here] != table.forward.ravel()[there]
+    here, there = here[opposite], there[opposite]
+    normal, own, other = normals[here // 3], inward.reshape(-1, 3)[here], inward.reshape(-1, 3)[there]
+    angle = np.arctan2(-np.einsum("ij,ij->i", normal, other), np.einsum("ij,ij->i", own, other)) % (2 * np.pi)
+    angle[angle < _COINCIDENT] = 2 * np.pi
+    order = np.lexsort((there, angle, here))
+    first = order[np.concatenate([[True], np.diff(here[order]) > 0])[: len(order)]]
+    slopes = np.zeros(faces.size)
+    convex = first[angle[first] < np.pi]
+    slopes[here[convex]] = 1 / np.tan(angle[convex] / 2)
+    links = np.stack([here[first] // 3, there[first] // 3], axis=1)
+    return Sides(slopes.reshape(-1, 3), links, bool((angle > 2 * np.pi - _COINCIDENT).any()))
+
+
+def _candidates(count: Ints, start: Ints, corner: Ints) -> tuple[Ints, Ints]:
+    """Return all ordered pairs of different corners at one edge."""
+    here: list[Ints] = []
+    there: list[Ints] = []
+    for size in np.unique(count[count > 1]).tolist():
+        members = corner[start[count == size][:, None] + np.arange(size)]
+        a, b = np.nonzero(~np.eye(size, dtype=np.bool_))
+        here.append(members[:, a].ravel())
+        there.append(members[:, b].ravel())
+    empty = np.zeros(0, dtype=np.int64)
+    return np.concatenate([empty, *here]), np.concatenate([empty, *there])
