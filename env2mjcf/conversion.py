@@ -65,9 +65,22 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
         folder, name = target.parent, target.stem
     else:
         folder, name = target, scene.compiled.document.name
+    _refuse_foreign(folder / f"{name}.xml", log)
     with _clear_write_errors(folder, log):
         assets = _write(scene, folder, name, log)
     return Conversion(folder / f"{name}.xml", assets, scene.environment, scene.diagnostics, scene.report)
+
+
+def _refuse_foreign(final: Path, log: DiagnosticLog) -> None:
+    """Refuse to replace a file that is no MJCF, such as the XML environment that is being converted."""
+    if not final.is_file():
+        return
+    text = re.sub(r"<\?.*?\?>|<!--.*?-->", "", final.read_text(encoding="utf-8", errors="replace"), flags=re.DOTALL)
+    if not text.lstrip().startswith("<mujoco"):
+        log.fail(
+            ConversionError, "MJC423", str(final), f"{final} is no MJCF, and is not replaced",
+            hint="choose another output folder, or name the file: out/scene.xml",
+        )  # fmt: skip
 
 
 def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[Path, ...]:
@@ -127,12 +140,12 @@ def _named_assets(xml: Path) -> set[str]:
 def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
     try:
         yield
-    except (FileExistsError, NotADirectoryError) as error:
+    except (FileExistsError, NotADirectoryError):
         log.fail(
             ConversionError,
             "MJC421",
             str(folder),
-            f"{error.filename or folder} is a file; expected a folder to write to",
+            f"{folder} is, or lies under, a file; expected a folder to write to",
         )
     except PermissionError as error:
         log.fail(

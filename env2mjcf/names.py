@@ -10,7 +10,7 @@ from .dofs import Dof
 from .model import Environment, MultiBody
 
 # Control characters cannot stand in XML; '/' and ':' are separators in MuJoCo names of this project.
-_UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f/:\s]+|[^\x00-\uffff]")
+_UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f/:\s\ud800-\udfff]+|[^\x00-\uffff]")
 
 
 def mesh_stem(filename: str) -> str:
@@ -19,10 +19,13 @@ def mesh_stem(filename: str) -> str:
 
 
 def unique(stems: Iterable[str]) -> list[str]:
-    """Make names unique by `_2`, `_3` in their order; a name that a file already has is passed over."""
+    """Make names unique by `_2`, `_3` in their order; a name that a file already has is passed over.
+
+    `world` is MuJoCo's own: the first of that name is `world_2`.
+    """
     stems = list(stems)
     taken = set(stems)
-    seen: dict[str, int] = {}
+    seen: dict[str, int] = {"world": 1}
     names: list[str] = []
     for stem in stems:
         count = seen.get(stem, 0) + 1

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
 from os import PathLike
 from typing import Any, Literal, get_args
 
@@ -108,6 +109,8 @@ class Options:
                 guess = did_you_mean(name, known)
                 raise TypeError(f"unknown option {name!r}{f'; {guess}' if guess else ''} (options: {', '.join(known)})")
         values = dict(keywords)
+        for name, value in values.items():
+            _check_kind(name, value)
         for name in ("robots", "mesh_dirs"):
             value = values.get(name, ())
             values[name] = (value,) if isinstance(value, (str, PathLike)) else tuple(value)
@@ -143,6 +146,38 @@ def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
         raise ValueError(f"{name}={value!r} is not one of {choices}{f'; {guess}' if guess else ''}")
 
 
+_NUMBERS = ("density", "scale")
+_FLAGS = (
+    "strict",
+    "allow_outside",
+    "primitives",
+    "self_collision",
+    "inter_robot",
+    "exclude_rest_contacts",
+    "ground",
+    "cache",
+)
+_LISTS = ("gravity", "exclude_pairs")
+
+
+def _check_kind(name: str, value: Any) -> None:
+    """Raise a TypeError that names an option whose value is of a wrong kind."""
+    expected = ""
+    if name in _FLAGS and not isinstance(value, bool):
+        expected = "True or False"
+    elif name in _NUMBERS and (isinstance(value, bool) or not isinstance(value, Real)):
+        expected = "a number"
+    elif name == "adjacent_links" and (isinstance(value, bool) or not isinstance(value, Integral)):
+        expected = "an integer"
+    elif name == "limits" and not isinstance(value, Limits):
+        expected = "Limits(...)"
+    elif name in (*_LISTS, "robots", "mesh_dirs") and not isinstance(value, (Iterable, PathLike)):
+        expected = "a sequence"
+    if expected:
+        raise TypeError(f"{name}={value!r}; expected {expected}")
+
+
 def _pair(value: Any) -> tuple[str, str]:
-    first, second = value
-    return str(first), str(second)
+    if isinstance(value, str) or len(pair := tuple(value)) != 2:
+        raise ValueError(f"exclude_pairs holds {value!r}; expected pairs of names, as in [('link1', 'block')]")
+    return str(pair[0]), str(pair[1])

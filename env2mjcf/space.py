@@ -106,7 +106,10 @@ class ConfigurationSpace:
         Raises:
             ValueError: The shape is wrong, or a value is not finite; the message names the degree of freedom.
         """
-        values = np.asarray(q, dtype=np.float64)
+        try:
+            values = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"q holds something that is no number: {error}") from error
         if values.ndim not in (1, 2) or values.shape[-1] != self.dim:
             listed = ", ".join(self.names[:12]) + (", ..." if self.dim > 12 else "")
             raise ValueError(
@@ -166,8 +169,7 @@ class ConfigurationSpace:
             x = slot.columns[0]
             q[..., x : x + 3] = values[..., slot.address : slot.address + 3]
             quaternion = values[..., slot.address + 3 : slot.address + 7]
-            norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
-            q[..., x + 3], q[..., x + 4], q[..., x + 5] = angles_from_quaternion(quaternion / norm)
+            q[..., x + 3], q[..., x + 4], q[..., x + 5] = angles_from_quaternion(_unit(quaternion))
         return q
 
     def sample(self, n: int, seed: int) -> Array:
@@ -199,6 +201,8 @@ class ConfigurationSpace:
         if n < 2:
             raise ValueError(f"n is {n}; expected at least 2, for both ends")
         start, delta = self.check(q0), self.difference(q0, q1)
+        if delta.ndim != 1 or start.ndim != 1:
+            raise ValueError(f"q0 and q1 of shapes {np.shape(q0)} and {np.shape(q1)}; expected two of ({self.dim},)")
         return start + np.linspace(0.0, 1.0, n)[:, None] * delta
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Array:
@@ -207,10 +211,18 @@ class ConfigurationSpace:
         return np.where(self.periodic, wrap(delta), delta)
 
     def within_limits(self, q: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether configurations (..., dim) keep their limits, closed; periodic ones always do."""
+        """Return whether configurations (..., dim) keep the limits of their joints, closed.
+
+        Periodic angles always do. So do the positions of bases: the boundary is one of vertices, and the origin of a
+        body may lie outside its mesh.
+        """
+        return ~np.any(self.broken(q), axis=-1)
+
+    def broken(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """Return which degrees of freedom are beyond their limits, (..., dim); see `within_limits`."""
         values = self._last_axis(q, "q")
-        inside = (values >= self.lower) & (values <= self.upper)
-        return np.all(inside | self.periodic, axis=-1)
+        free = self.periodic | (self._axis >= 0)
+        return ~free & ((values < self.lower) | (values > self.upper))
 
     def _bound_bases(self, boundary: Boundary | None) -> None:
         """A base stays within the boundary, as its vertices do."""
@@ -231,6 +243,12 @@ class ConfigurationSpace:
         if array.shape[-1:] != (self.dim,):
             raise ValueError(f"{what} of shape {array.shape}; expected (..., {self.dim})")
         return array
+
+
+def _unit(quaternion: Array) -> Array:
+    """Return unit quaternions; the zero quaternion counts as no rotation, as in MuJoCo."""
+    norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    return np.where(norm > 0, quaternion / np.where(norm > 0, norm, 1.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def children_first_to_last(robot: RobotKinematics, body: int | None) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -84,6 +85,17 @@ def test_a_truncated_asset_is_written_again(tmp_path: Path) -> None:
     assert files(tmp_path) == whole
 
 
+def test_a_scene_is_not_replaced_by_its_own_conversion(tmp_path: Path) -> None:
+    shutil.copytree(MODELS / "xml-arm", tmp_path / "in")
+    before = files(tmp_path / "in")
+    with pytest.raises(env2mjcf.ConversionError, match="is no MJCF") as caught:
+        env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in")
+    assert caught.value.code == "MJC423"
+    assert files(tmp_path / "in") == before
+    env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in/model.xml")
+    env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in/model.xml")
+
+
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("I am a file")
     with pytest.raises(env2mjcf.ConversionError, match="expected a folder") as caught:
@@ -129,6 +141,11 @@ def test_options_are_checked_before_anything_is_done(tmp_path: Path) -> None:
         env2mjcf.convert(SEED, tmp_path / "out", collision="hul")
     with pytest.raises(ValueError, match="positive"):
         env2mjcf.load(SEED, scale=-1)
+    for wrong in ({"scale": "a"}, {"strict": "yes"}, {"limits": 3}, {"adjacent_links": 1.5}, {"gravity": 5}):
+        with pytest.raises(TypeError, match=next(iter(wrong))):
+            env2mjcf.load(SEED, **wrong)
+    with pytest.raises(ValueError, match="exclude_pairs"):
+        env2mjcf.load(SEED, exclude_pairs=("a", "b"))
     with pytest.raises(ValueError, match="dialect A only"):
         env2mjcf.load(MODELS / "alpha/alpha.env", semantics="page")
     assert not (tmp_path / "out").exists()

@@ -180,6 +180,12 @@ def test_exact_boxes_become_box_geoms_on_request(tmp_path: Path) -> None:
     np.testing.assert_array_equal(boxes.in_collision(q), meshes.in_collision(q))
 
 
+def test_a_link_may_be_called_world(tmp_path: Path) -> None:
+    robot = "1\nworld.g Volumetric Rotational\nConnections\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube(robot=robot), world=box_mesh(1, 1, 1)))
+    assert scene.link_names == ("world_2",)
+
+
 def test_equal_meshes_are_written_once_and_namesakes_are_kept_apart(tmp_path: Path) -> None:
     for folder, size in (("a", 0.5), ("b", 0.5), ("c", 0.25)):
         write_scene(tmp_path / folder, "", cube=box_mesh(size, size, size))

@@ -142,6 +142,47 @@ def notch_mean() -> float:
     return float(np.mean([-1, -1, 1, 1, 0.25, 0.25, 1, 1]))
 
 
+def test_plates_that_cross_in_one_plane_collide(tmp_path: Path) -> None:
+    """MuJoCo's native algorithm misses some overlaps of aligned boxes; verdicts must not."""
+    robot = "1\nplate.g Volumetric Rotational\nConnections\n0\n"
+    text = free_cube("plate.g 0 0 0 0 0 0", robot=robot, boundary="Boundary Box [-30:30 ; -30:30 ; -30:30]")
+    scene = env2mjcf.load(write_scene(tmp_path, text, plate=box_mesh(0.5, 0.05, 0.005)))
+    rng = np.random.default_rng(0)
+    rows = np.zeros((4000, 6))
+    rows[:, :2] = np.round(rng.uniform(-0.5, 0.5, (4000, 2)) * 8) / 8
+    rows[:, 5] = rng.integers(0, 8, 4000) * np.pi / 4
+    # Both plates lie in one plane: they overlap where their rectangles do (separating axes of the plane).
+    angle = rows[:, 5]
+    axes = np.stack([np.ones(4000), np.zeros(4000), np.cos(angle), np.sin(angle)], 1).reshape(4000, 2, 2)
+    axes = np.concatenate([axes, np.stack([-axes[..., 1], axes[..., 0]], -1)], axis=1)
+    turned = np.stack([np.stack([np.cos(angle), np.sin(angle)], -1), np.stack([-np.sin(angle), np.cos(angle)], -1)], 1)
+    reach = np.abs(axes) @ [0.5, 0.05] + np.abs(np.einsum("nak,nsk->nas", axes, turned)) @ [0.5, 0.05]
+    depth = (reach - np.abs(np.einsum("nak,nk->na", axes, rows[:, :2]))).min(axis=1)
+    sure = np.abs(depth) > 1e-5 * scene.extent
+    assert 500 < (depth[sure] > 0).sum() < 3900
+    np.testing.assert_array_equal(scene.in_collision(rows)[sure], depth[sure] > 0)
+
+
+def test_a_base_beside_its_mesh_may_lie_outside_the_boundary(tmp_path: Path) -> None:
+    """The boundary is one of vertices: the origin of a mesh that is not recentred does not count."""
+    lines = box_mesh(0.5, 0.5, 0.5).splitlines()
+    lines[2:10] = [f"{float(x) + 5} {y} {z}" for x, y, z in (line.split() for line in lines[2:10])]
+    robot = "1\noff.g -a(None) Planar Rotational\nConnections\n0\n"
+    text = free_cube("0 0 0 0 0 0", boundary="Boundary Box [-3:3 ; -3:3 ; -3:3]", robot=robot)
+    scene = env2mjcf.load(write_scene(tmp_path, text, off="\n".join(lines) + "\n"))
+    assert scene.is_valid([-6.5, 0, 0])
+    assert not scene.is_valid([-1.5, 0, 0])
+    assert not scene.is_valid([-5, 0, 0])
+
+
+def test_a_call_is_checked_as_the_options_are(cubes: env2mjcf.Scene) -> None:
+    assert cubes.in_collision(np.zeros((0, 6)), threads=3).shape == (0,)
+    with pytest.raises(ValueError, match="'foo' is not one of"):
+        cubes.in_collision(at(0, 0, 0), engine="foo")
+    with pytest.raises(ValueError, match="no number"):
+        cubes.in_collision(["a"] * 6)
+
+
 def test_edges_are_checked_between_their_ends(cubes: env2mjcf.Scene) -> None:
     above, below = at(5, 0, 4), at(5, 0, -4)
     assert not cubes.in_collision(np.stack([above, below])).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import sys
 from collections.abc import Callable
@@ -29,7 +30,7 @@ def thread_count(threads: int | None, rows: int) -> int:
     """
     if threads is None:
         return 1 if rows < _ROWS_FOR_THREADS else os.cpu_count() or 1
-    if threads < 1:
+    if operator.index(threads) < 1:
         raise ValueError(f"threads is {threads}; expected at least 1")
     return threads
 
@@ -60,7 +61,7 @@ def in_chunks(
         bar.update(min(_CHUNK, len(rows) - start))
 
     with bar:
-        if count == 1 or len(starts) == 1:
+        if count == 1 or len(starts) <= 1:
             for start in starts:
                 one(start)
             return answers

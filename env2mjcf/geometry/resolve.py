@@ -33,6 +33,12 @@ def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) 
     Raises:
         GeometryError: One or more files are missing, forbidden or unreadable; one error names them all.
     """
+    for extra in options.mesh_dirs:
+        if not Path(extra).is_dir():
+            log.warn(
+                GeometryError, "GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder",
+                hint="check the path: it is relative to the current directory",
+            )  # fmt: skip
     finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
     found: dict[str, Path] = {}
     problems: dict[str, _Problem] = {}

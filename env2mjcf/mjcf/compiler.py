@@ -19,7 +19,7 @@ from .keyframes import add_keyframes
 from .loops import add_loops
 from .reporting import report_unused
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky
-from .writer import add, comment_text, to_text
+from .writer import add, comment_text, plain, to_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def compile_mjcf(
     environment = assembly.environment
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs))
     compilation.assets.plan([p.mesh for p in assembly.parts()])
-    root = etree.Element("mujoco", model=environment.name)
+    root = etree.Element("mujoco", model=plain(environment.name))
     add_settings(root, assembly, options)
     asset = add(root, "asset")
     add_sky(asset)
@@ -62,7 +62,7 @@ def compile_mjcf(
     add_loops(root, compilation, log)
     if options.actuators == "position":
         add_actuators(root, compilation, log)
-    report_unused(environment, log)
+    report_unused(environment, options, log)
     add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from ..errors import DiagnosticLog
 from ..model import Environment
+from ..options import Options
 
 # Attributes of an <Environment> node that concern the planner's own simulation.
 _PHYSICS = ("gravity", "frictionCoefficient")
 
 
-def report_unused(environment: Environment, log: DiagnosticLog) -> None:
-    """Report textures, controls and physical attributes, which are kept in the model and not written."""
+def report_unused(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    """Report textures, controls and physical attributes, which are kept and not written, and options without effect."""
+    if options.boundary is not None and environment.boundary is None:
+        log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
     attributes = dict(environment.attributes)
     for name in _PHYSICS:
         if name in attributes:

@@ -31,6 +31,11 @@ def tidy(values: ArrayLike) -> Array:
     return np.where(np.abs(array) < 1e-15 * max(1.0, float(np.max(np.abs(array), initial=0.0))), 0.0, array)
 
 
+def plain(text: str) -> str:
+    """Return text with what cannot stand in XML (control characters, undecodable bytes) as question marks."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
 def add(parent: Element, tag: str, **attributes: str | None) -> Element:
     """Append an element; attributes that are None are left out, a trailing `_` of a name is dropped (`class_`)."""
     element = etree.SubElement(parent, tag)
@@ -47,7 +52,7 @@ def comment(parent: Element, lines: Iterable[str]) -> None:
 
 def comment_text(lines: Iterable[str], indent: str = "") -> str:
     """Return the text of a comment; `--` and control characters cannot stand in one."""
-    lines = ["".join(c if c.isprintable() else "?" for c in line).replace("--", "- -") for line in lines]
+    lines = [plain(line).replace("--", "- -") for line in lines]
     if len(lines) == 1:
         return f" {lines[0]} "
     return "\n" + "".join(f"{indent}  {line}\n" for line in lines) + indent

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import mujoco
 import numpy as np
@@ -122,7 +122,11 @@ class Scene:
         return tuple(Query(t.robot, self.space.of_task(t), t.label) for t in self.environment.tasks)
 
     def spec(self) -> mujoco.MjSpec:
-        """Return the scene as a new MjSpec, to be attached to another one."""
+        """Return the scene as a new MjSpec, to be attached to another one.
+
+        An attached spec takes the options of its parent: give that `filterparent="disable"` and this scene's time step
+        where they matter.
+        """
         return load_spec(self._compiled.document)
 
     @property
@@ -354,6 +358,8 @@ class Scene:
 
 
 def _only_available(engine: str, executor: Executor | None) -> None:
+    if engine not in get_args(Engine):
+        raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, get_args(Engine)))}")
     if engine == "exact":
         raise NotImplementedError("engine='exact' is not available yet; use engine='mujoco'")
     if executor is not None:

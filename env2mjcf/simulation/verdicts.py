@@ -102,7 +102,7 @@ class Judge:
 
     def _broken_limits(self, q: Array) -> tuple[BrokenLimit, ...]:
         space = self._scene.space
-        beyond = ~space.periodic & ((q < space.lower) | (q > space.upper))
+        beyond = space.broken(q)
         return tuple(
             BrokenLimit(space.names[i], float(q[i]), float(space.lower[i]), float(space.upper[i]))
             for i in np.flatnonzero(beyond)
