@@ -125,3 +125,12 @@ def test_a_scene_simulates_stably(corpus: Path, name: str) -> None:
     assert not scene.data.warning.number.any()
     fall = 9.81 * scene.data.time
     assert np.abs(scene.data.cvel).max() < 20 * (fall + 1) * max(1.0, 1 / scene.extent)
+
+
+def test_aligned_links_that_cross_deeply_collide(corpus: Path) -> None:
+    """MuJoCo's native algorithm finds nothing here: links 4 and 7 cross in one plane, 1.25e-3 of the extent deep."""
+    scene = load("pmpl-ReachableVolumes.ClosedChain.chain.tree.vizmo")
+    q = scene.space.decode([-15.75, 12.75, 17.75, -0.25, -0.5, -0.25, -0.25, -0.25, 0, 0, 0, -0.25, 0.25, -0.25, 0, 0])
+    assert ("link_4", "link_7") in {(c.link, c.other) for c in scene.contacts(q)}
+    assert scene.in_collision(q)
+    assert scene.clearance(q) < -1e-3 * scene.extent
