@@ -285,17 +285,3 @@ def test_a_scene_with_nothing_in_it_loads(tmp_path: Path) -> None:
     scene = env2mjcf.load(write_scene(tmp_path, "Boundary Box [-1:1 ; -1:1 ; -1:1]\nMultibodies\n0\n"))
     assert scene.obstacle_names == ()
     assert scene.model.nbody == 1
-
-
-def test_recorded_nodes_and_paths_of_the_planner_are_free(corpus: Path) -> None:
-    """serial: 89 nodes on the walls' surface and a path of 513; branchs: 219 and 309 (env-format section 15)."""
-    for folder, env, files in (
-        ("old-testSerialInWall.serial", "serial.env", {"surface.path": 89, "serial.path": 513}),
-        ("old-testBranchs.branchs", "branchs.env", {"surface.path": 219, "branchs.path": 309}),
-    ):
-        scene = env2mjcf.load(corpus / "scenes" / folder / env, collision="surface")
-        for name, count in files.items():
-            lines = (corpus / "scenes" / folder / name).read_text().splitlines()
-            cfg = np.array([line.split() for line in lines[3 : 3 + count]], dtype=float)
-            assert cfg.shape == (count, scene.space.dim)
-            assert not scene.in_collision(scene.space.decode(cfg)).any()
