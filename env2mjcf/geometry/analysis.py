@@ -184,7 +184,8 @@ def mesh_diagnostics(
             f"the surface is open: {analysis.open_edges} edges border an odd number of triangles",
             "it collides as a sheet: a body wholly inside it does not count as touching",
         )
-    if not analysis.consistent:
+    # A sheet has no outside, so that its winding says nothing.
+    if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
         warn("GEO234", f"neighbouring faces are wound opposite ways; {done}")
     elif analysis.inverted:
