@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from scenes import box_mesh, free_cube, write_scene
+from scenes import box_mesh, free_cube, without_privileges, write_scene
 
 import env2mjcf
 
@@ -163,26 +162,8 @@ def test_a_binary_file_instead_of_a_scene(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "code"), [("scene.env", "ENV103"), ("cube.g", "GEO204")])
 def test_a_file_that_may_not_be_read_is_named(tmp_path: Path, name: str, code: str) -> None:
-    """In a child without privileges, since root may read everything."""
     path = write_scene(tmp_path, GOOD)
     (tmp_path / name).chmod(0)
-    for folder in (tmp_path, *tmp_path.parents):
-        if folder.stat().st_uid == os.getuid() and folder != Path("/"):
-            folder.chmod(folder.stat().st_mode | 0o055)
-    read_end, write_end = os.pipe()
-    child = os.fork()
-    if child == 0:
-        if os.getuid() == 0:
-            os.setuid(65534)
-        try:
-            env2mjcf.load(path)
-            answer = "no error"
-        except env2mjcf.Env2MjcfError as error:
-            answer = f"{error.code} {error}"
-        os.write(write_end, answer.encode())
-        os._exit(0)
-    os.close(write_end)
-    os.waitpid(child, 0)
-    answer = os.read(read_end, 10_000).decode()
+    answer = without_privileges(tmp_path, lambda: env2mjcf.load(path))
     assert answer.startswith(code)
     assert str(tmp_path / name) in answer

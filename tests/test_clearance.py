@@ -12,7 +12,7 @@ from scenes import MODELS, box_mesh, free_cube, write_scene
 from test_scene import notched_block
 
 import env2mjcf
-from env2mjcf.contact.certificate import certified
+from env2mjcf.contact.advancement import certified
 
 FLYER = "1\nsmall.g Volumetric Rotational\nConnections\n0\n"
 

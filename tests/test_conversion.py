@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
-from scenes import MODELS, box_mesh, free_cube, write_scene
+from scenes import MODELS, box_mesh, free_cube, without_privileges, write_scene
 
 import env2mjcf
 
@@ -106,28 +106,10 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
 def test_a_folder_that_may_not_be_written_is_named(tmp_path: Path) -> None:
-    """In a child without privileges, since root may write everywhere."""
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)
-    for folder in (tmp_path, *tmp_path.parents):
-        if folder.stat().st_uid == os.getuid() and folder != Path("/"):
-            folder.chmod(folder.stat().st_mode | 0o055)
     scene = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
-    read_end, write_end = os.pipe()
-    child = os.fork()
-    if child == 0:
-        if os.getuid() == 0:
-            os.setuid(65534)
-        try:
-            env2mjcf.convert(scene, closed / "out")
-            answer = "no error"
-        except env2mjcf.ConversionError as error:
-            answer = f"{error.code} {error}"
-        os.write(write_end, answer.encode())
-        os._exit(0)
-    os.close(write_end)
-    os.waitpid(child, 0)
-    answer = os.read(read_end, 10_000).decode()
+    answer = without_privileges(tmp_path, lambda: env2mjcf.convert(scene, closed / "out"))
     assert answer.startswith("MJC420")
     assert "may not be written" in answer
     assert str(closed) in answer

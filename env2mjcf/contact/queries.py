@@ -13,8 +13,8 @@ from ..geometry.assembly import Part
 from ..options import Collision
 from ..pipeline import Compiled
 from ..transforms import Array
+from .advancement import certified
 from .boundary import BoundaryTest
-from .certificate import certified
 from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
