@@ -9,8 +9,9 @@ import numpy as np
 from ..dofs import DofKind
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
+from ..layout import children_first_to_last
 from ..options import Options
-from ..space import ConfigurationSpace, children_first_to_last
+from ..space import ConfigurationSpace
 from ..transforms import Array, inverse, quaternion_from_matrix
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from ..dofs import Dof, DofKind
 from ..geometry.assembly import RobotParts
+from ..layout import joint_kinds
 from ..model import BaseKind
-from ..space import joint_kinds
 from ..transforms import inverse
 from .writer import Element, add, number, numbers, tidy
 
