@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from distances import surface_distances
 from real_scenes import real_scene, scene_names
 from scenes import MODELS, box_mesh, free_cube, write_scene
@@ -13,6 +14,7 @@ from test_scene import notched_block
 
 import env2mjcf
 from env2mjcf.contact.advancement import certified
+from env2mjcf.formats.byu import export_byu
 
 FLYER = "1\nsmall.g Volumetric Rotational\nConnections\n0\n"
 
@@ -222,3 +224,11 @@ def test_no_stretch_is_passed_over_however_thin_the_obstacle(motion: float) -> N
         hit = certified(lambda rows, place=place: np.abs(rows[:, 0] - place) - 1e-4, start, delta, motion, 1e-6)
         assert not hit
         assert certified(lambda rows, place=place: np.hypot(rows[:, 0] - place, 0.01), start, delta, motion, 1e-6)
+
+
+def test_a_ball_of_many_edges_inside_a_convex_body_has_a_depth(tmp_path: Path) -> None:
+    """No triangles touch that could say which edges to try."""
+    ball = export_byu(trimesh.creation.icosphere(subdivisions=2, radius=0.15))
+    robot = "1\nball.g Volumetric Rotational\nConnections\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube("0 0 0 0 0 0", robot=robot), ball=ball))
+    assert scene.clearance(at(0, 0, 0.1)) == pytest.approx(-0.55, abs=1e-6)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 import trimesh
 from real_scenes import real_scene
 from scenes import MODELS, box_mesh, free_cube, write_scene
+from simulations import simulated, start, weight
 from truth import Truth
 
 import env2mjcf
@@ -51,34 +50,6 @@ def _depth(solid: Part, pose: np.ndarray, other: Part, other_pose: np.ndarray) -
         return 0.0
     surface = trimesh.Trimesh(a.vertices, a.faces, process=False)
     return float(np.abs(trimesh.proximity.closest_point_naive(surface, points)[1]).max())
-
-
-def simulated(scene: env2mjcf.Scene, seconds: float, every: float = 0.25) -> Iterator[float]:
-    """Simulate, and yield the total energy now and then; it is the highest since the last time."""
-    model, data = scene.model, scene.data
-    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    mujoco.mj_forward(model, data)
-    highest, steps = float(data.energy.sum()), round(every / model.opt.timestep)
-    for n in range(1, 1 + round(seconds / model.opt.timestep)):
-        mujoco.mj_step(model, data)
-        # The energy of the state that the step began with: positions and velocities of one moment.
-        highest = max(highest, float(data.energy.sum()))
-        if n % steps == 0:
-            yield highest
-            highest = -np.inf
-    assert not data.warning.number.any()
-
-
-def start(scene: env2mjcf.Scene, q: np.ndarray) -> float:
-    """Set a free configuration; return its energy."""
-    assert not Truth(scene).collides(q)
-    scene.set(q)
-    mujoco.mj_energyPos(scene.model, scene.data)
-    return float(scene.data.energy[0])
-
-
-def weight(scene: env2mjcf.Scene) -> float:
-    return float(scene.model.body_mass.sum() * np.linalg.norm(scene.model.opt.gravity))
 
 
 @pytest.mark.parametrize("seed", range(3))

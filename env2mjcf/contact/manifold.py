@@ -91,7 +91,8 @@ class Manifolds:
     def _of_triangles(self, index: int, poses: Mapping[str, Array]) -> list[Touch]:
         job = self._clearance.pair_jobs(poses, np.array([index]))
         trees, touch = self._surfaces.trees, self._clearance.touch
-        rows = Search(trees, job, np.array([np.inf]), touch).within(self._band)[:, 1:]
+        near = Search(trees, job, np.array([np.inf]), touch).within(self._band)
+        rows = near[:, 1:]
         a, b = trees.triangles[rows[:, 0]], trees.triangles[rows[:, 1]] @ job.rotation[0].T + job.translation[0]
         parts = [nearest(a[i : i + _BLOCK], b[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
         distance = np.concatenate([np.zeros(0), *(p.distance for p in parts)])
@@ -103,8 +104,14 @@ class Manifolds:
         places = np.concatenate([(p.on_a + p.on_b) / 2 for p in parts])[met]
         first, second = (self._surfaces.surface(int(t)) for t in (job.a[0], job.b[0]))
         normals, depths = _through(a[met], b[met], first, second)
-        world, turned = places @ pose[:3, :3].T + pose[:3, 3], normals @ pose[:3, :3].T
-        return [Touch(p, n, -float(d)) for p, n, d in zip(world, turned, depths, strict=True)]
+        # A triangle pushed off one that it merely meets at an edge may go far: no contact is deeper than its pair.
+        whole, push = separations(self._surfaces, job, near[distance <= touch], touch)
+        ways = depths <= max(float(whole[0]), self._band)
+        if not ways.any():
+            position = pose[:3, :3] @ places.mean(axis=0) + pose[:3, 3]
+            return [Touch(position, pose[:3, :3] @ -push[0], -float(whole[0]))]
+        world, turned = places[ways] @ pose[:3, :3].T + pose[:3, 3], normals[ways] @ pose[:3, :3].T
+        return [Touch(p, n, -float(d)) for p, n, d in zip(world, turned, depths[ways], strict=True)]
 
     def _apart_or_inside(self, job: Jobs, pose: Array) -> Touch:
         """Return the nearest points of surfaces that do not touch, and how deep one is inside the other, if it is."""

@@ -131,7 +131,7 @@ def _edges(triangles: Floats) -> Floats:
 def _square_to(first: Floats, second: Floats) -> Floats:
     """Return unit vectors square to each edge of one and of the other, (t, e, 3) and (t, f, 3) to (t, e * f, 3)."""
     found = unit(np.cross(first[:, :, None], second[:, None]))
-    return found.reshape(len(first), -1, 3)
+    return found.reshape(len(first), first.shape[1] * second.shape[1], 3)
 
 
 def _shortest(first: Floats, second: Floats, axes: Floats) -> Floats:
