@@ -140,7 +140,10 @@ def test_an_arm_falls_on_a_table_and_rests_on_it(tmp_path: Path, x: float, turn:
     seen.check()
     assert seen.deepest < 0.01
     assert seen.shifted[-1, -1, 2] < -0.5
-    assert ("fore", "table") in {(c.link, c.other) for c in scene.contacts(scene.q())}
+    contacts = scene.contacts(scene.q())
+    assert ("fore", "table") in {(c.link, c.other) for c in contacts}
+    # No contact is deeper than its pair, though some triangles meet the table's side at its edge.
+    assert min(c.distance for c in contacts) > -0.01 * min(p.mesh.diagonal for p in scene.compiled.assembly.parts())
 
 
 def stack(folder: Path, crates: list[str], *obstacles: str, **meshes: str) -> Fall:
