@@ -44,6 +44,8 @@ class Report:
         geoms: Geoms of the model that collide.
         mass: Mass of all links, kg.
         extent: Diagonal of the bounding box at home, metres.
+        band: Verdicts are certain where bodies are farther apart, or deeper in each other, than this, metres: twice the
+            greatest band of a mesh, since two meshes meet.
         meshes: One entry for each mesh.
         diagnostics: Number of diagnostics by severity.
     """
@@ -61,6 +63,7 @@ class Report:
     geoms: int
     mass: float
     extent: float
+    band: float
     meshes: tuple[MeshReport, ...]
     diagnostics: dict[str, int]
 
@@ -105,6 +108,7 @@ def report(compiled: Compiled) -> Report:
         geoms=len(compiled.document.owners),
         mass=sum(p.inertial.mass for p in links if p.inertial),
         extent=assembly.extent,
+        band=assembly.band,
         meshes=tuple(meshes.values()),
         diagnostics=counts,
     )

@@ -194,3 +194,11 @@ def test_a_certificate_is_kept_like_a_shape(tmp_path, monkeypatch):
     monkeypatch.setattr("env2mjcf.geometry.certificate._measured", lambda *_: pytest.fail("it was measured again"))
     warm = env2mjcf.load(scene, collision="hull").report
     assert cold == warm
+
+
+def test_a_scene_is_certain_beyond_the_band_of_two_meshes() -> None:
+    path = MODELS / "alpha/alpha.env"
+    exact, hull = env2mjcf.load(path).report, env2mjcf.load(path, collision="hull").report
+    assert exact.band == pytest.approx(1e-5 * exact.extent)
+    assert hull.band > 0.1 * hull.extent
+    assert "Verdicts are certain beyond 8e-05 m" in env2mjcf.load(path).xml

@@ -63,6 +63,7 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
             ("mass", f"{report.mass:.6g} kg, all links"),
             ("geoms", f"{report.geoms} that collide"),
             ("pairs", f"{report.pairs} tested"),
+            ("certain", f"beyond {report.band:.2g} m of contact"),
         ]
     )
 

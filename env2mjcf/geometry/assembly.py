@@ -111,6 +111,11 @@ class Assembly:
         """Diagonal of the bounding box: the unit of every tolerance (design: section 2)."""
         return float(np.linalg.norm(self.upper - self.lower))
 
+    @property
+    def band(self) -> float:
+        """Clearance or depth, in metres, beyond which verdicts are certain: both bodies of a pair may be off."""
+        return 2 * max((p.certificate.band for p in self.parts() if p.certificate is not None), default=0.0)
+
     def parts(self) -> tuple[Part, ...]:
         """Return all bodies: robots, obstacles, surfaces."""
         return (*(p for r in self.robots for p in r.links), *self.obstacles, *self.surfaces)

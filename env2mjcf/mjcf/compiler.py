@@ -76,6 +76,7 @@ def _header(assembly: Assembly, options: Options) -> str:
         f"Converted by env2mjcf {package_version()} from {environment.name}: dialect {environment.dialect}, "
         f"{environment.semantics} semantics, collision {options.collision}.",
         f"Units: metres (file unit x {options.scale:g}), kilograms, radians. Extent {assembly.extent:.6g} m.",
+        f"Verdicts are certain beyond {assembly.band:.2g} m of contact, {assembly.band / assembly.extent:.2g} of it.",
     ]
     seen: set[str] = set()
     for part in assembly.parts():
