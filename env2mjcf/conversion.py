@@ -65,8 +65,8 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
         folder, name = target.parent, target.stem
     else:
         folder, name = target, scene.compiled.document.name
-    _refuse_foreign(folder / f"{name}.xml", log)
     with _clear_write_errors(folder, log):
+        _refuse_foreign(folder / f"{name}.xml", log)
         assets = _write(scene, folder, name, log)
     return Conversion(folder / f"{name}.xml", assets, scene.environment, scene.diagnostics, scene.report)
 

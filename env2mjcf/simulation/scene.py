@@ -219,7 +219,10 @@ class Scene:
         return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._queries.validities, threads, progress))
 
     def contacts(self, q: ArrayLike) -> list[Contact]:
-        """Return every contact of one configuration, pairs that cannot move included."""
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
+
+        Pairs that cannot move are included.
+        """
         return self._queries.contacts(self._row(q))
 
     def clearance(
