@@ -118,9 +118,7 @@ def _surface(part: Part, collision: Collision) -> Surface:
     return _made(triangles, solid, outward, analysis.convex, analysis.box, triangles[first, 0])
 
 
-def _made(
-    triangles: Floats, solid: bool, outward: bool, convex: bool, box: Box | None, points: Floats
-) -> Surface:
+def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, box: Box | None, points: Floats) -> Surface:
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
     along = unit(along[(along != 0).any(axis=1)])

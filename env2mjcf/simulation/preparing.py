@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from ..contact.exact.engine import require
 from ..contact.types import Contact
 from ..errors import DiagnosticLog, KinematicsError
 from ..model import Dialect
@@ -37,7 +38,7 @@ def load(path: PathArgument, **options: Any) -> Scene:
 def prepare(path: PathArgument, options: Options, log: DiagnosticLog) -> Scene:
     """Load a scene with options already checked; see `load`."""
     if options.engine == "exact":
-        raise NotImplementedError("engine='exact' is not available yet; use engine='mujoco' or 'auto'")
+        require()
     compiled = compile_scene(path, options, log)
     scene = _scene(compiled, log)
     touching = _touching_pairs(scene.contacts(scene.space.home)) if scene.link_names else {}

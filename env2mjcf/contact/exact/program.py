@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.assembly import Assembly
 from ...geometry.topology import Floats, Ints
+from ...model import Boundary
 from ...pairs import Pair
 from ...space import ConfigurationSpace
 from ...transforms import inverse, transform
+from ..boundary import ROUNDING
 from ..surfaces import Surface, Surfaces
 from .motions import Motions
-from .tables import Table, packed
+from .tables import BoundaryKind, Table, packed
 from .wide_tree import LANES, WideTree, box_tree, depth, wide_tree
 
 
@@ -29,27 +33,49 @@ def program(
         surfaces: Of all bodies.
     """
     shapes = _Shapes(surfaces)
-    names = [n for r in assembly.robots for n in r.names]
+    parts = [p for r in assembly.robots for p in r.links]
     motions = Motions()
     steps: list[int] = []
     for robot, columns in zip(assembly.robots, space.robot_slices, strict=True):
         frames = [shapes.frame(n) for n in robot.names]
         steps += motions.add(robot.kinematics, columns.start, frames)
     obstacles = _Obstacles(assembly, shapes)
-    number = {n: i for i, n in enumerate(names)}
+    number = {p.name: i for i, p in enumerate(parts)}
     links = [
         (step, shapes.number(name), obstacles.root([p.other for p in pairs if p.link == name and p.kind == "obstacle"]))
-        for name, step in zip(names, steps, strict=True)
+        for name, step in zip(number, steps, strict=True)
     ]
+    vertices = [_into(shapes.frame(p.name), p.mesh.vertices[np.unique(p.mesh.faces)]) for p in parts]
+    first = np.cumsum([0, *map(len, vertices)])
     constants, of_steps = motions.arrays()
+    kind, bounds = _bounds(assembly.environment.boundary)
     tables = {
         Table.STEPS: of_steps,
         Table.CONSTANTS: constants,
-        Table.LINKS: links,
+        Table.LINKS: [(*link, first[i], first[i + 1]) for i, link in enumerate(links)],
         Table.PAIRS: [(number[p.link], number[p.other]) for p in pairs if p.kind != "obstacle"],
-        Table.SCALARS: [obstacles.stack, shapes.stack],
+        Table.COUNTS: (int(kind), obstacles.stack, shapes.stack),
+        Table.LIMITS: np.stack(space.joint_limits, axis=1),
+        Table.VERTICES: _joined(vertices),
+        Table.BOUNDARY: bounds,
     }
     return packed(tables | shapes.tables() | obstacles.tables())
+
+
+def _bounds(boundary: Boundary | None) -> tuple[BoundaryKind, Floats]:
+    """Return what links must stay within, as `Table.BOUNDARY` has it, with room for rounding."""
+    bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
+    if boundary is None:
+        return BoundaryKind.NONE, bounds
+    if boundary.lower:
+        axes = len(boundary.lower)
+        slack = ROUNDING * float(np.max(np.abs([boundary.lower, boundary.upper])))
+        bounds[0, :axes], bounds[1, :axes] = np.array(boundary.lower) - slack, np.array(boundary.upper) + slack
+        return BoundaryKind.BOX, bounds
+    bounds[:] = 0.0
+    bounds[0, : len(boundary.center)] = boundary.center
+    bounds[1, :2] = boundary.radius * (1 + ROUNDING), len(boundary.center)
+    return BoundaryKind.BALL, bounds
 
 
 class _Shapes:
@@ -81,8 +107,8 @@ class _Shapes:
 
     def box(self, number: int) -> Floats:
         """Return the half sizes of a shape's box."""
-        surface = self._surfaces.surface(number)
-        return self._trees[number].boxes[0, 3:, 0] if surface.box is None else surface.box.half_sizes
+        box = self._surfaces.surface(number).box
+        return self._trees[number].boxes[0, 3:, 0] if box is None else np.sort(box.half_sizes)[::-1]
 
     def tables(self) -> dict[Table, object]:
         """Return the tables of shapes and their trees."""
@@ -97,7 +123,9 @@ class _Shapes:
             children.append(np.where(tree.child < 0, tree.child - blocks[k], child))
             surface = self._surfaces.surface(k)
             kind = (int(surface.box is not None), int(surface.solid))
-            rows.append((int(nodes[k]), *kind, int(points[k]), int(points[k + 1]), int(surface.convex)))
+            # The root has one lane, the whole, which is tested before walks begin; unless that is all there is.
+            start = nodes[k] + max(int(tree.child[0, 0]), 0)
+            rows.append((int(nodes[k]), int(start), *kind, int(points[k]), int(points[k + 1])))
             halves.append((*self.box(k), _smallest_component(surface)))
         return {
             Table.SHAPES: rows,
@@ -151,13 +179,19 @@ class _Obstacles:
 
 
 def _frame(surfaces: Surfaces, number: int) -> Floats:
-    """Return the pose of a mesh's box in the mesh's frame, (4, 4): the box that it is, else a small one around it."""
+    """Return the pose of a mesh's box in the mesh's frame, (4, 4): the box that it is, else a small one around it.
+
+    z is its shortest side: rays along it pass the fewest triangles.
+    """
     box, trees = surfaces.surface(number).box, surfaces.trees
     root = trees.roots[number]
-    axes = trees.frame[root] if box is None else box.rotation
-    if np.linalg.det(axes) < 0:
-        axes = axes * np.array([1.0, 1.0, -1.0])
-    return transform(axes, trees.center[root] if box is None else box.center)
+    center, axes, half = (
+        (trees.center[root], trees.frame[root], trees.half[root])
+        if box is None
+        else (box.center, box.rotation, box.half_sizes)
+    )
+    axes = axes[:, np.argsort(-half, kind="stable")]
+    return transform(axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))]), center)
 
 
 def _into(frame: Floats, points: Floats) -> Floats:
@@ -171,5 +205,5 @@ def _smallest_component(surface: Surface) -> float:
     return float(np.linalg.norm(np.ptp(surface.corners, axis=0))) if len(surface.points) == 1 else 0.0
 
 
-def _joined(arrays: Sequence[Floats] | Sequence[Ints]) -> Floats | Ints:
+def _joined(arrays: Sequence[Floats] | Sequence[Ints]) -> NDArray[Any]:
     return np.concatenate(arrays) if len(arrays) else np.zeros(0)

@@ -16,14 +16,16 @@ class Table(IntEnum):
 
     Attributes:
         STEPS: (s, 8) parent, motion and columns of the steps of kinematics.
-        LINKS: (l, 3) step, shape, and root of the tree over the obstacles that the link is tested with, or -1.
-        SHAPES: (k, 6) root, is it a box, does its inside count, first component point and the one after the last,
-            is it convex.
+        LINKS: (l, 5) step, shape, root of the tree over the obstacles that the link is tested with, or -1; its first
+            vertex and the one after the last.
+        SHAPES: (k, 6) root; where walks over its tree alone begin; is it a box; does its inside count; its first
+            component point and the one after the last.
         CHILDREN: (n, 8) of the nodes of the meshes' trees; see `WideTree`.
         OBSTACLES: (o, 1) shape.
         TOP_CHILDREN: (n, 8) of the trees over obstacles; a leaf is ~obstacle.
         PAIRS: (p, 2) links that are tested against each other.
-        SCALARS: (1, 2) most entries on the stack of a walk over obstacles, and over meshes.
+        COUNTS: (1, 3) shape of the boundary (`BoundaryKind`), most entries on the stack of a walk over
+            obstacles, and over meshes.
         CONSTANTS: (s, 12) constant transforms of the steps.
         HALVES: (k, 4) half sizes of each shape's box, and the diagonal of its smallest component's box.
         BOXES: (n, 48) of the nodes of the meshes' trees.
@@ -31,6 +33,10 @@ class Table(IntEnum):
         POINTS: (c, 3) one point of each component of a shape.
         POSES: (o, 12) of obstacles.
         TOP_BOXES: (n, 48) of the nodes of the trees over obstacles.
+        LIMITS: (dim, 2) least and greatest value of each degree of freedom, infinite where there is none.
+        VERTICES: (v, 3) extreme vertices of each link, in the frame of its shape.
+        BOUNDARY: (2, 3) lower and upper corner, infinite on axes that are not bounded; or the centre and, in the second
+            row, the radius and the number of bounded axes.
     """
 
     STEPS = 0
@@ -40,7 +46,7 @@ class Table(IntEnum):
     OBSTACLES = 4
     TOP_CHILDREN = 5
     PAIRS = 6
-    SCALARS = 7
+    COUNTS = 7
     CONSTANTS = 8
     HALVES = 9
     BOXES = 10
@@ -48,13 +54,24 @@ class Table(IntEnum):
     POINTS = 12
     POSES = 13
     TOP_BOXES = 14
+    LIMITS = 15
+    VERTICES = 16
+    BOUNDARY = 17
 
 
-WIDTHS = (8, 3, 6, 8, 1, 8, 2, 2, 12, 4, 48, 36, 3, 12, 48)
+WIDTHS = (8, 5, 6, 8, 1, 8, 2, 3, 12, 4, 48, 36, 3, 12, 48, 2, 3, 3)
 """Columns of each table."""
 
 FIRST_OF_FLOATS = Table.CONSTANTS
 """The tables before it are integers."""
+
+
+class BoundaryKind(IntEnum):
+    """What links must stay within."""
+
+    NONE = 0
+    BOX = 1
+    BALL = 2
 
 
 def packed(tables: Mapping[Table, Any]) -> tuple[Ints, Floats]:
@@ -68,10 +85,13 @@ def packed(tables: Mapping[Table, Any]) -> tuple[Ints, Floats]:
     starts: list[int] = []
     lengths = [2 * len(Table), 0]
     for table in Table:
-        kind = table >= FIRST_OF_FLOATS
-        values = np.ascontiguousarray(tables[table], dtype=np.float64 if kind else np.int64).reshape(-1)
-        assert len(values) % WIDTHS[table] == 0, table
-        starts += [lengths[kind], len(values) // WIDTHS[table]]
-        lengths[kind] += len(values)
-        (floats if kind else ints).append(values)
+        real = table >= FIRST_OF_FLOATS
+        if real:
+            floats.append(np.asarray(tables[table], dtype=np.float64).ravel())
+        else:
+            ints.append(np.asarray(tables[table], dtype=np.int64).ravel())
+        count = len((floats if real else ints)[-1])
+        assert count % WIDTHS[table] == 0, table
+        starts += [lengths[real], count // WIDTHS[table]]
+        lengths[real] += count
     return np.concatenate([np.array(starts, dtype=np.int64), *ints]), np.concatenate(floats)

@@ -84,7 +84,7 @@ class _Branch:
 
     @property
     def surface(self) -> float:
-        return _surface(self.high - self.low)
+        return float(_surface(self.high - self.low))
 
 
 class _Builder:

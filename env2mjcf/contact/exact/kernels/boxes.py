@@ -39,9 +39,7 @@ def boxes_apart(m: Pose, a0: float, a1: float, a2: float, b0: float, b1: float, 
 
 
 @compiled
-def lanes_near(
-    row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1: float, a2: float
-) -> int:
+def lanes_near(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1: float, a2: float) -> int:
     """Return the lanes whose boxes overlap another box, as bits.
 
     Args:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from ..motions import Motion
@@ -12,14 +13,14 @@ _TURN_Z, _TURN_X, _SLIDE_Z, _BASE = int(Motion.TURN_Z), int(Motion.TURN_X), int(
 
 
 @compiled
-def place(tables: Tables, q: Any, sines: Any, cosines: Any, frames: Any) -> None:
-    """Fill frames, (s, 12), with the world poses of all steps at a configuration, (dim,), whose sines are known."""
+def place(tables: Tables, q: Any, frames: Any) -> None:
+    """Fill frames, (s, 12), with the world poses of all steps at a configuration, (dim,)."""
     for i in range(len(tables.steps)):
         step = tables.steps[i]
         frame = frames[i]
         motion = step[1]
         if motion == _BASE:
-            _place_base(step, q, sines, cosines, frame)
+            _place_base(step, q, frame)
             continue
         constant = tables.constants[i]
         if step[0] < 0:
@@ -27,14 +28,13 @@ def place(tables: Tables, q: Any, sines: Any, cosines: Any, frames: Any) -> None
                 frame[k] = constant[k]
         else:
             _chain(frames[step[0]], constant, frame)
-        column = step[2]
         if motion == _TURN_Z:
-            _turn(frame, 0, 1, sines[column], cosines[column])
+            _turn(frame, 0, 1, q[step[2]])
         elif motion == _TURN_X:
-            _turn(frame, 1, 2, sines[column], cosines[column])
+            _turn(frame, 1, 2, q[step[2]])
         elif motion == _SLIDE_Z:
             for k in range(0, 12, 4):
-                frame[k + 3] += q[column] * frame[k + 2]
+                frame[k + 3] += q[step[2]] * frame[k + 2]
 
 
 @compiled
@@ -48,8 +48,9 @@ def _chain(a: Any, b: Any, out: Any) -> None:
 
 
 @compiled
-def _turn(frame: Any, i: int, j: int, sine: float, cosine: float) -> None:
+def _turn(frame: Any, i: int, j: int, angle: float) -> None:
     """Turn columns i and j into each other."""
+    sine, cosine = math.sin(angle), math.cos(angle)
     for k in range(0, 12, 4):
         x, y = frame[k + i], frame[k + j]
         frame[k + i] = cosine * x + sine * y
@@ -57,18 +58,18 @@ def _turn(frame: Any, i: int, j: int, sine: float, cosine: float) -> None:
 
 
 @compiled
-def _place_base(step: Any, q: Any, sines: Any, cosines: Any, frame: Any) -> None:
+def _place_base(step: Any, q: Any, frame: Any) -> None:
     """Translate and turn by Rz Ry Rx (env-format section 9.2)."""
     for k in range(3):
         frame[4 * k + 3] = q[step[2 + k]] if step[2 + k] >= 0 else 0.0
-    sx, cx = _sine(step[5], sines, cosines)
-    sy, cy = _sine(step[6], sines, cosines)
-    sz, cz = _sine(step[7], sines, cosines)
+    sx, cx = _sine_and_cosine(q, step[5])
+    sy, cy = _sine_and_cosine(q, step[6])
+    sz, cz = _sine_and_cosine(q, step[7])
     frame[0], frame[1], frame[2] = cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx
     frame[4], frame[5], frame[6] = sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx
     frame[8], frame[9], frame[10] = -sy, cy * sx, cy * cx
 
 
 @compiled
-def _sine(column: int, sines: Any, cosines: Any) -> tuple[float, float]:
-    return (sines[column], cosines[column]) if column >= 0 else (0.0, 1.0)
+def _sine_and_cosine(q: Any, column: int) -> tuple[float, float]:
+    return (math.sin(q[column]), math.cos(q[column])) if column >= 0 else (0.0, 1.0)

@@ -6,9 +6,10 @@ from typing import Any
 
 from .compiling import compiled, compiled_strictly
 from .opening import Tables
-from .poses import larger
+from .poses import Vector, larger, smaller
 
 _LANES, _BLOCK = 8, 4
+_START = 1
 
 # The ray goes up along z and leans by this much, so that it meets no edge of a mesh whose edges run along its axes.
 _LEAN_X, _LEAN_Y = 0.0123917, 0.0271813
@@ -28,7 +29,7 @@ def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) 
     # The ray's foot in the plane z = 0, along its lean.
     u, v = x - _LEAN_X * z, y - _LEAN_Y * z
     winding = 0
-    stack[0] = tables.shapes[shape, 0]
+    stack[0] = tables.shapes[shape, _START]
     count = 1
     while count > 0:
         count -= 1
@@ -59,21 +60,30 @@ def _lanes_above(row: Any, u: float, v: float, z: float) -> int:
 
 @compiled
 def _crossings(row: Any, u: float, v: float, z: float) -> int:
-    """Return how many triangles of a leaf the ray leaves through, minus those it enters through."""
+    """Return how many triangles of a leaf the ray's line leaves through above z, minus those it enters through."""
+    around = 0
+    for k in range(_BLOCK):
+        p, q, r = _sides(row, k, u, v)
+        around |= (1 << k) if larger(smaller(smaller(p, q), r), -larger(larger(p, q), r)) > 0 else 0
     total = 0
     for k in range(_BLOCK):
-        ax, ay = _foot(row[k], row[8 + k], _LEAN_X, u), _foot(row[4 + k], row[8 + k], _LEAN_Y, v)
-        bx, by = _foot(row[12 + k], row[20 + k], _LEAN_X, u), _foot(row[16 + k], row[20 + k], _LEAN_Y, v)
-        cx, cy = _foot(row[24 + k], row[32 + k], _LEAN_X, u), _foot(row[28 + k], row[32 + k], _LEAN_Y, v)
-        p, q, r = _side(ax, ay, bx, by), _side(bx, by, cx, cy), _side(cx, cy, ax, ay)
-        if (p > 0) != (q > 0) or (q > 0) != (r > 0):
-            continue
-        # Barycentric: each corner weighs as much as the part of the area opposite to it.
-        height = (q * row[8 + k] + r * row[20 + k] + p * row[32 + k]) / (p + q + r)
         # A leaf that is not full has its last triangle several times.
-        if height > z and not (k > 0 and _same(row, k)):
-            total += 1 if p > 0 else -1
+        if around >> k & 1 and not (k > 0 and _same(row, k)):
+            p, q, r = _sides(row, k, u, v)
+            # Barycentric: each corner weighs as much as the part of the area opposite to it.
+            height = (q * row[8 + k] + r * row[20 + k] + p * row[32 + k]) / (p + q + r)
+            if height > z:
+                total += 1 if p > 0 else -1
     return total
+
+
+@compiled
+def _sides(row: Any, k: int, u: float, v: float) -> Vector:
+    """Return on which side of the ray's line the edges of a triangle pass, all alike if it is around the line."""
+    ax, ay = _foot(row[k], row[8 + k], _LEAN_X, u), _foot(row[4 + k], row[8 + k], _LEAN_Y, v)
+    bx, by = _foot(row[12 + k], row[20 + k], _LEAN_X, u), _foot(row[16 + k], row[20 + k], _LEAN_Y, v)
+    cx, cy = _foot(row[24 + k], row[32 + k], _LEAN_X, u), _foot(row[28 + k], row[32 + k], _LEAN_Y, v)
+    return _side(ax, ay, bx, by), _side(bx, by, cx, cy), _side(cx, cy, ax, ay)
 
 
 @compiled
@@ -94,10 +104,9 @@ def _foot(x: float, z: float, lean: float, origin: float) -> float:
 @compiled_strictly
 def _side(ax: float, ay: float, bx: float, by: float) -> float:
     """Return twice the area between an edge and the ray: opposite numbers for opposite directions, and never zero."""
-    swapped = ax > bx or (ax == bx and ay > by)
-    area = by * ax - bx * ay
-    if swapped:
-        area = bx * ay - by * ax
-    if area == 0.0:
-        area = _TINY
+    swapped = (ax > bx) | ((ax == bx) & (ay > by))
+    low_x, low_y = (bx, by) if swapped else (ax, ay)
+    high_x, high_y = (ax, ay) if swapped else (bx, by)
+    area = low_x * high_y - high_x * low_y
+    area = _TINY if area == 0.0 else area
     return -area if swapped else area

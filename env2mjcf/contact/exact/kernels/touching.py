@@ -12,7 +12,7 @@ from .poses import Pose, inverted, moved, relative
 from .triangles import box_meets, corners, placed, triangle_meets
 
 _LANES, _BLOCK = 8, 4
-_ROOT, _IS_BOX, _IS_SOLID, _FIRST, _LAST = 0, 1, 2, 3, 4
+_ROOT, _START, _IS_BOX, _IS_SOLID, _FIRST, _LAST = 0, 1, 2, 3, 4, 5
 
 
 @compiled
@@ -61,7 +61,7 @@ def _box_in_box(m: Pose, a: Any, b: Any) -> bool:
 def _box_crosses(tables: Tables, half: Any, t: int, m: Pose, stack: Any) -> bool:
     """Return whether a solid box meets any triangle of shape t, at pose m in the box's frame."""
     h0, h1, h2 = half[0], half[1], half[2]
-    stack[0] = tables.shapes[t, _ROOT]
+    stack[0] = tables.shapes[t, _START]
     count = 1
     while count > 0:
         count -= 1
@@ -97,7 +97,7 @@ def _trees_cross(tables: Tables, s: int, t: int, m: Pose, stack: Any) -> bool:
             continue
         row_p, row_q = tables.boxes[p // _LANES], tables.boxes[q // _LANES]
         i, j = p % _LANES, q % _LANES
-        if child_q < 0 or (child_p >= 0 and _size(row_p, i) > _size(row_q, j)):
+        if child_q < 0 or (child_p >= 0 and box_size(row_p, i) > box_size(row_q, j)):
             lanes = lanes_near(
                 tables.boxes[child_p], back,
                 row_q[j], row_q[8 + j], row_q[16 + j], row_q[24 + j], row_q[32 + j], row_q[40 + j],
@@ -119,7 +119,8 @@ def _trees_cross(tables: Tables, s: int, t: int, m: Pose, stack: Any) -> bool:
 
 
 @compiled
-def _size(row: Any, k: int) -> float:
+def box_size(row: Any, k: int) -> float:
+    """Return what tells large boxes of a node from small ones."""
     return row[24 + k] + row[32 + k] + row[40 + k]
 
 
