@@ -21,6 +21,7 @@ from .options import Options as Options
 
 if TYPE_CHECKING:
     from .contact.types import Contact as Contact
+    from .contact.types import PackedContacts as PackedContacts
     from .contact.types import PathReport as PathReport
     from .conversion import Conversion as Conversion
     from .conversion import convert as convert
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 # These need MuJoCo, which reading does not: they are imported when they are first used.
 _LAZY = {
     "Contact": ".contact.types",
+    "PackedContacts": ".contact.types",
     "PathReport": ".contact.types",
     "Conversion": ".conversion",
     "convert": ".conversion",

@@ -1,25 +1,53 @@
-"""Splits many rows into chunks, and works on them in one thread or several."""
+"""Asks a question about many rows: at once, in threads, or on an executor; the same answers in the same order."""
 
 from __future__ import annotations
 
 import operator
 import os
 import sys
+import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ..transforms import Array
+from .chunks import Chunks
+from .queries import ContactQueries
+from .remote import on_executor, worker_count
 
 # Below this many rows threads cost more than they bring.
 _ROWS_FOR_THREADS = 10_000
-_CHUNK = 2_000
+# Seconds of work below which it is not worth handing out rows, in this process and beyond it.
+_LEAST_HERE, _LEAST_THERE = 0.002, 0.02
 
-_Answer = TypeVar("_Answer", np.bool_, np.float64)
+# Takes where a chunk lies, and its answers.
+Store = Callable[[slice, Any], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """What is asked about rows.
+
+    Attributes:
+        function: Takes the queries, a chunk of each column and the extras; returns the chunk's answers. It must be
+            found by its name, because it may be called in another process.
+        columns: Arrays with one entry for each row.
+        extras: More arguments, the same for every row.
+        row_bytes: What working on a row needs.
+    """
+
+    function: Callable[..., Any]
+    columns: tuple[NDArray[Any], ...]
+    extras: tuple[Any, ...]
+    row_bytes: int
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return len(self.columns[0])
 
 
 def thread_count(threads: int | None, rows: int) -> int:
@@ -35,41 +63,77 @@ def thread_count(threads: int | None, rows: int) -> int:
     return threads
 
 
-def in_chunks(
-    rows: Array,
-    work: Callable[[Array], NDArray[_Answer]],
+def ask(
+    queries: ContactQueries,
+    question: Question,
+    store: Store,
     threads: int | None,
+    executor: Executor | None,
     progress: bool,
-    kind: type[_Answer] = np.bool_,
-) -> NDArray[_Answer]:
-    """Apply `work` to chunks of rows and join the answers; the same answers at any number of threads.
+) -> None:
+    """Store the answers to a question.
 
     Args:
-        rows: (n, dim).
-        work: Takes (k, dim), returns (k,).
-        threads: See `thread_count`.
+        queries: Who answers.
+        question: What is asked.
+        store: Is given the answers of each chunk, chunks in any order, and may be called in several threads.
+        threads: See `thread_count`; with an executor, how many of its workers to keep busy, None: all of them.
+        executor: Where to work.
         progress: Whether to show a progress bar on a terminal.
-        kind: What the answers are.
+
+    Raises:
+        ValueError: Fewer than one thread was asked for.
+        TypeError: The executor is none.
     """
-    answers = np.zeros(len(rows), dtype=kind)
-    starts = range(0, len(rows), _CHUNK)
-    count = thread_count(threads, len(rows))
-    bar = tqdm(total=len(rows), unit="q", disable=not (progress and sys.stderr.isatty()), delay=1, leave=False)
+    rows = question.rows
+    bar = tqdm(total=rows, unit="q", delay=1, leave=False) if progress and sys.stderr.isatty() else None
+    count = thread_count(threads, rows)
+    try:
+        if executor is not None:
+            workers = worker_count(executor) if threads is None else count
+            chunks = Chunks(rows, workers, question.row_bytes, _LEAST_THERE)
+            on_executor(executor, queries, question, chunks, _noting(store, bar), workers)
+        elif rows:
+            _in_threads(queries, question, _noting(store, bar), count)
+    finally:
+        if bar is not None:
+            bar.close()
 
-    def one(start: int) -> None:
-        answers[start : start + _CHUNK] = work(rows[start : start + _CHUNK])
-        bar.update(min(_CHUNK, len(rows) - start))
 
-    with bar:
-        if count == 1 or len(starts) <= 1:
-            for start in starts:
-                one(start)
-            return answers
-        pool = ThreadPoolExecutor(min(count, len(starts)), thread_name_prefix="env2mjcf")
+def _noting(store: Store, bar: Any) -> Store:
+    if bar is None:
+        return store
+
+    def both(rows: slice, answers: Any) -> None:
+        store(rows, answers)
+        bar.update(rows.stop - rows.start)
+
+    return both
+
+
+def _in_threads(queries: ContactQueries, question: Question, store: Store, count: int) -> None:
+    """Work in this thread and in others beside it, which end before this returns, whatever happens."""
+    chunks = Chunks(question.rows, count, question.row_bytes, _LEAST_HERE)
+
+    def work() -> None:
         try:
-            for future in [pool.submit(one, start) for start in starts]:
-                future.result()
+            while (rows := chunks.take()) is not None:
+                began = time.perf_counter()
+                store(rows, question.function(queries, *(c[rows] for c in question.columns), *question.extras))
+                chunks.took(rows.stop - rows.start, time.perf_counter() - began)
         finally:
-            # Ctrl-C and errors leave nothing running behind.
-            pool.shutdown(wait=True, cancel_futures=True)
-    return answers
+            # After an error, or Ctrl-C in this thread, the others end with the chunk that they are at.
+            chunks.close()
+
+    if count == 1:
+        work()
+        return
+    pool = ThreadPoolExecutor(count - 1, thread_name_prefix="env2mjcf")
+    try:
+        others = [pool.submit(work) for _ in range(count - 1)]
+        work()
+        for other in others:
+            other.result()
+    finally:
+        chunks.close()
+        pool.shutdown(wait=True, cancel_futures=True)

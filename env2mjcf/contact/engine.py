@@ -38,6 +38,11 @@ class MujocoEngine:
         for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
             self._model.opt.disableflags |= int(flag)
 
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The model that is asked: an engine made of it answers alike."""
+        return self._model
+
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
         return mujoco.MjData(self._model)

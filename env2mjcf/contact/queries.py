@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,6 +24,7 @@ from .engine import MujocoEngine
 from .exact.engine import ExactEngine, available
 from .manifold import Manifolds, Touch
 from .motion import MotionBounds
+from .paths import EdgeSteps
 from .static_pairs import static_contacts
 from .surfaces import Surfaces
 from .types import Contact
@@ -36,11 +39,15 @@ class ContactQueries:
     Args:
         compiled: The scene.
         model: Its model.
+        static: Contacts of the pairs that cannot move, where they are known.
     """
 
-    def __init__(self, compiled: Compiled, model: mujoco.MjModel) -> None:
+    def __init__(self, compiled: Compiled, model: mujoco.MjModel, static: tuple[Contact, ...] | None = None) -> None:
         assembly, document = compiled.assembly, compiled.document
         self.links = [p for r in assembly.robots for p in r.links]
+        self._compiled = compiled
+        # Looking for numba takes longer than a verdict.
+        self._compiles = available()
         self._space = compiled.space
         self._assembly = assembly
         self._pairs = compiled.pairs.tested
@@ -58,10 +65,29 @@ class ContactQueries:
         self._exact: ExactEngine | None = None
         self._moving = tuple(p for p in self._pairs if not p.constant)
         between_links = [p for p in self._moving if p.kind != "obstacle"]
+        self.steps = EdgeSteps(assembly, self._space)
         self._motion = MotionBounds(assembly, self._space, between_links)
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        self._static = static_contacts(model, data, self._pairs, document.owners)
+        if static is None:
+            data = mujoco.MjData(model)
+            mujoco.mj_kinematics(model, data)
+            static = static_contacts(model, data, self._pairs, document.owners)
+        self._static = static
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel without what queries do not need, and with the choice of the engine: it must not change elsewhere."""
+        engine: Engine = "exact" if self._is_exact(None) else "mujoco"
+        options = dataclasses.replace(self._compiled.options, engine=engine)
+        document = dataclasses.replace(self._compiled.document, xml="", assets={})
+        compiled = dataclasses.replace(self._compiled, options=options, document=document, diagnostics=())
+        return type(self), (compiled, self._engine.model, self._static)
+
+    def row_bytes(self, engine: Engine | None = None, verdicts: bool = False) -> int:
+        """Return what working on a row needs, at most: poses and vertices are much, but verdicts may do without."""
+        columns = 4 * self._space.dim + 2
+        if verdicts and self._is_exact(engine):
+            return 8 * columns
+        vertices = max((len(p.mesh.vertices) for p in self.links), default=0)
+        return 8 * (columns + 32 * len(self.links) + len(self._moving) + 6 * vertices)
 
     def link_poses(self, rows: Array) -> Array:
         """Return the world poses of all links, (n, nlinks, 4, 4)."""
@@ -99,11 +125,12 @@ class ContactQueries:
             out[touching] = self._triangles.clearance.signed(self._poses_by_name(rows[touching]), int(touching.sum()))
         return out
 
-    def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return whether anything touches at one of so many even steps, (e,), of ways from (e, dim) by (e, dim)."""
+    def edges_collide(self, start: Array, delta: Array, resolution: float) -> NDArray[np.bool_]:
+        """Return whether anything touches at even steps of such a length of ways from (e, dim) by (e, dim), (e,)."""
         exact = self._chosen(None)
         if self._static:
             return np.ones(len(start), dtype=bool)
+        steps = self.steps.counts(start, delta, resolution)
         if exact is not None:
             return exact.edges_collide(start, delta, steps)
         ways = zip(start, delta, steps, strict=True)
@@ -151,14 +178,21 @@ class ContactQueries:
         Raises:
             ValueError: It is asked for by name, and numba is not installed.
         """
-        engine = engine or self._default
-        if engine == "mujoco" or (engine == "auto" and not available()):
+        if not self._is_exact(engine):
             return None
         if self._exact is None:
             with self._lock:
                 if self._exact is None:
                     self._exact = ExactEngine(self._assembly, self._space, self._moving, self._surfaces)
         return self._exact
+
+    def _is_exact(self, engine: Engine | None) -> bool:
+        engine = engine or self._default
+        return engine == "exact" or (engine == "auto" and self._compiles)
+
+    def pair_index(self, contact: Contact) -> int:
+        """Return which of the tested pairs a contact is of."""
+        return self._pair_of[frozenset((contact.link, contact.other))]
 
     def contacts(self, row: Array) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches."""

@@ -34,6 +34,31 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PackedContacts:
+    """The contacts of many configurations, one after the other.
+
+    Those of configuration i are the entries from `offsets[i]` up to `offsets[i + 1]`: the ones of `contacts(q[i])`, in
+    the same order, and their fields mean the same.
+
+    Attributes:
+        offsets: (n + 1,) int64, from 0 to the number k of all contacts.
+        pair: (k,) int64, index into `scene.pairs`.
+        position: (k, 3).
+        normal: (k, 3), from the first body of the pair towards the second.
+        distance: (k,).
+    """
+
+    offsets: NDArray[np.int64]
+    pair: NDArray[np.int64]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    distance: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PathReport:
     """What is wrong with a path, if anything.
 

@@ -5,26 +5,20 @@ from __future__ import annotations
 import copy
 import dataclasses
 import threading
-from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..contact.batch import in_chunks
-from ..contact.paths import EdgeSteps, check_path
 from ..contact.queries import ContactQueries
-from ..contact.types import Contact, PathReport
 from ..errors import Diagnostic
 from ..model import Environment
-from ..options import Engine
 from ..pipeline import Compiled
 from ..report import Report, report
-from ..space import ConfigurationSpace
 from ..transforms import Array
+from .answers import Answers
 from .loading import load_spec
 
 
@@ -43,7 +37,7 @@ class Query:
     label: str = ""
 
 
-class Scene:
+class Scene(Answers):
     """A scene loaded into MuJoCo.
 
     Configurations q are float64, (dim,) or (n, dim), in metres and radians, in the planner's order of the degrees of
@@ -58,13 +52,11 @@ class Scene:
     """
 
     def __init__(self, compiled: Compiled, model: mujoco.MjModel) -> None:
+        super().__init__(ContactQueries(compiled, model), compiled.space)
         self.model = model
-        self.space: ConfigurationSpace = compiled.space
         self.environment: Environment = compiled.environment
         self.diagnostics: tuple[Diagnostic, ...] = compiled.diagnostics
         self._compiled = compiled
-        self._queries = ContactQueries(compiled, model)
-        self._steps = EdgeSteps(compiled.assembly, self.space)
         self._data: mujoco.MjData | None = None
         self._lock = threading.Lock()
 
@@ -154,12 +146,6 @@ class Scene:
         """Return the configuration that `data` holds, (dim,)."""
         return self.space.from_qpos(self.data.qpos)
 
-    def link_poses(self, q: ArrayLike) -> Array:
-        """Return the world poses of all robot bodies out of MuJoCo's kinematics, (..., nlinks, 4, 4)."""
-        rows = self.space.check(q)
-        poses = self._queries.link_poses(np.atleast_2d(rows))
-        return poses if rows.ndim == 2 else poses[0]
-
     def obstacle_poses(self) -> Array:
         """Return the world poses of all obstacles, (m, 4, 4)."""
         return np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
@@ -170,157 +156,9 @@ class Scene:
         The greatest distance, over the ball around a loop's last link, between where the chain puts a point and where
         the loop-closing connection would.
         """
-        return self._scalar_or_rows(q, self._loop_errors)
-
-    # Verdicts.
-
-    def in_collision(
-        self,
-        q: ArrayLike,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
-        engine: Engine | None = None,
-    ) -> Any:
-        """Return whether any tested pair touches.
-
-        Args:
-            q: Configurations, (dim,) or (n, dim).
-            threads: Number of threads; None is 1 below 10,000 rows, else all cores.
-            executor: Not available yet.
-            progress: Show a progress bar on a terminal.
-            engine: Override the scene's engine.
-
-        Returns:
-            A bool, or (n,) bools.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite.
-            NotImplementedError: The engine or the executor is not available yet.
-        """
-        _only_available(engine or "auto", executor)
-
-        def answer(rows: Array) -> NDArray[np.bool_]:
-            return in_chunks(rows, lambda some: self._queries.collisions(some, engine), threads, progress)
-
-        return self._scalar_or_rows(q, answer)
-
-    def is_valid(
-        self,
-        q: ArrayLike,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
-        engine: Engine | None = None,
-    ) -> Any:
-        """Return whether q is within limits, every vertex is inside the boundary, and nothing collides.
-
-        Arguments, result and errors are those of `in_collision`.
-        """
-        _only_available(engine or "auto", executor)
-
-        def answer(rows: Array) -> NDArray[np.bool_]:
-            return in_chunks(rows, lambda some: self._queries.validities(some, engine), threads, progress)
-
-        return self._scalar_or_rows(q, answer)
-
-    def contacts(self, q: ArrayLike) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
-
-        Pairs that cannot move are included.
-        """
-        return self._queries.contacts(self._row(q))
-
-    def clearance(
-        self,
-        q: ArrayLike,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
-    ) -> Any:
-        """Return the least distance over the tested pairs, in metres; the boundary is not counted.
-
-        Free: the distance of the triangles, exact but for rounding; +inf without pairs.
-        In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
-        of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
-        the shortest translation that does. For two convex bodies of few faces it is that translation (for many faces,
-        not always). It fades to zero as bodies come free.
-
-        What collides is what is measured: with `collision="hull"` (and "coacd") the hulls instead of the triangles,
-        with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
-        of closed meshes.
-
-        Args:
-            q: Configurations, (dim,) or (n, dim).
-            threads: As for `in_collision`.
-            executor: Not available yet.
-            progress: Show a progress bar on a terminal.
-
-        Returns:
-            A float, or (n,) floats.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite.
-            NotImplementedError: The executor is not available yet.
-        """
-        _only_available("auto", executor)
-
-        def answer(rows: Array) -> Array:
-            return in_chunks(rows, self._queries.clearances, threads, progress, np.float64)
-
-        return self._scalar_or_rows(q, answer)
-
-    # Edges and paths.
-
-    def edge_in_collision(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None) -> Any:
-        """Return whether anything touches on the straight way between two configurations, ends included.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-            resolution: Greatest distance in metres that any point of a robot moves between two checks; None takes
-                the file's PositionRes, else 0.01 extent.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape, or the resolution is not positive.
-        """
-        start, delta = self._way(q0, q1)
-        steps = self._steps.counts(np.atleast_2d(start), np.atleast_2d(delta), resolution)
-        hits = self._queries.edges_collide(np.atleast_2d(start), np.atleast_2d(delta), steps)
-        return hits if start.ndim == 2 else bool(hits[0])
-
-    def edge_is_free(self, q0: ArrayLike, q1: ArrayLike) -> Any:
-        """Return whether nothing touches anywhere on the straight way between two configurations, proved.
-
-        True is a proof: distances along the way are compared with how far bodies can move (bounded as for
-        `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
-        than 1e-5 of the extent. Joint values in between are not rounded to any step.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape.
-        """
-        start, delta = self._way(q0, q1)
-        free = self._queries.edges_are_free(np.atleast_2d(start), np.atleast_2d(delta))
-        return free if start.ndim == 2 else bool(free[0])
-
-    def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
-        """Check the validity of a path's configurations and of the straight edges between them.
-
-        Args:
-            path: (k, dim).
-            resolution: As for `edge_in_collision`.
-
-        Raises:
-            ValueError: The path has a wrong shape, or the resolution is not positive.
-        """
-        return check_path(path, self._steps, self._queries.validities, self.contacts, self.space, resolution)
+        rows = self.space.check(q)
+        errors = self._loop_errors(np.atleast_2d(rows))
+        return errors if rows.ndim == 2 else errors[0].item()
 
     # Pickling: the model and the compiled scene travel, the rest is built again.
 
@@ -341,34 +179,9 @@ class Scene:
             f"{len(self.obstacle_names)} obstacles>"
         )
 
-    def _row(self, q: ArrayLike) -> Array:
-        row = self.space.check(q)
-        if row.ndim != 1:
-            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
-        return row
-
-    def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
-        """Return where ways begin, and where they lead from there."""
-        start, end = self.space.check(q0), self.space.check(q1)
-        if start.shape != end.shape:
-            raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
-        return start, self.space.difference(start, end)
-
-    def _scalar_or_rows(self, q: ArrayLike, answer: Callable[[Array], NDArray[Any]]) -> Any:
-        rows = self.space.check(q)
-        answers = answer(np.atleast_2d(rows) if rows.ndim == 1 else rows)
-        return answers if rows.ndim == 2 else answers[0].item()
-
     def _loop_errors(self, rows: Array) -> Array:
         worst = np.zeros(len(rows))
         for robot, columns in zip(self._compiled.assembly.robots, self.space.robot_slices, strict=True):
             gaps = robot.kinematics.loop_gaps(rows[:, columns], [p.radius for p in robot.links])
             worst = np.maximum(worst, gaps.max(axis=-1, initial=0.0))
         return worst
-
-
-def _only_available(engine: str, executor: Executor | None) -> None:
-    if engine not in get_args(Engine):
-        raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, get_args(Engine)))}")
-    if executor is not None:
-        raise NotImplementedError("executor=... is not available yet; use threads=...")

@@ -1,0 +1,324 @@
+"""What can be asked about a scene's configurations and edges, one or a million at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from math import isfinite
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..contact.batch import Question, ask
+from ..contact.packed import joined, packed
+from ..contact.paths import check_path
+from ..contact.queries import ContactQueries
+from ..contact.types import Contact, PackedContacts, PathReport
+from ..options import Engine
+from ..space import ConfigurationSpace
+from ..transforms import Array
+
+_ENGINES = get_args(Engine)
+_FLOAT = np.dtype(np.float64)
+
+
+class Answers:
+    """The queries of a `Scene`.
+
+    Args:
+        queries: Who answers.
+        space: The configuration space.
+    """
+
+    def __init__(self, queries: ContactQueries, space: ConfigurationSpace) -> None:
+        self._queries = queries
+        self.space: ConfigurationSpace = space
+        self._one_row = (space.dim,)
+
+    def link_poses(self, q: ArrayLike, *, threads: int | None = None) -> Array:
+        """Return the world poses of all robot bodies out of MuJoCo's kinematics, (..., nlinks, 4, 4).
+
+        Args:
+            q: Configurations, (dim,) or (n, dim).
+            threads: As for `in_collision`.
+        """
+        rows = self.space.check(q)
+        shape = (len(self._queries.links), 4, 4)
+        poses = self._rows(ContactQueries.link_poses, (np.atleast_2d(rows),), threads, None, False, shape=shape)
+        return poses if rows.ndim == 2 else poses[0]
+
+    # Verdicts.
+
+    def in_collision(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+        engine: Engine | None = None,
+    ) -> Any:
+        """Return whether any tested pair touches.
+
+        The answers are the same with every number of threads and with every executor.
+
+        Args:
+            q: Configurations, (dim,) or (n, dim).
+            threads: Number of threads; None is 1 below 10,000 rows, else all cores. With an executor: how many of its
+                workers to keep busy, None for all.
+            executor: Where to work: any `concurrent.futures.Executor`, threads, processes, or
+                `dask.distributed.Client(...).get_executor()`. It stays the caller's, who shuts it down.
+            progress: Show a progress bar on a terminal.
+            engine: Override the scene's engine.
+
+        Returns:
+            A bool, or (n,) bools.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite, or the engine is unknown or not installed.
+            TypeError: The executor is none.
+            concurrent.futures.BrokenExecutor: A worker process died, and the executor does not replace it.
+        """
+        if engine is executor is threads is None and (one := self._at_once(q)) is not None:
+            return self._queries.collisions(one)[0].item()
+        return self._verdicts(ContactQueries.collisions, q, threads, executor, progress, engine)
+
+    def is_valid(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+        engine: Engine | None = None,
+    ) -> Any:
+        """Return whether q is within limits, every vertex is inside the boundary, and nothing collides.
+
+        Arguments, result and errors are those of `in_collision`.
+        """
+        if engine is executor is threads is None and (one := self._at_once(q)) is not None:
+            return self._queries.validities(one)[0].item()
+        return self._verdicts(ContactQueries.validities, q, threads, executor, progress, engine)
+
+    def clearance(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+    ) -> Any:
+        """Return the least distance over the tested pairs, in metres; the boundary is not counted.
+
+        Free: the distance of the triangles, exact but for rounding; +inf without pairs.
+        In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
+        of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
+        the shortest translation that does. For two convex bodies of few faces it is that translation (for many faces,
+        not always). It fades to zero as bodies come free.
+
+        What collides is what is measured: with `collision="hull"` (and "coacd") the hulls instead of the triangles,
+        with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
+        of closed meshes.
+
+        Args:
+            q: Configurations, (dim,) or (n, dim).
+            threads: As for `in_collision`.
+            executor: As for `in_collision`.
+            progress: Show a progress bar on a terminal.
+
+        Returns:
+            A float, or (n,) floats.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite.
+        """
+        rows = self.space.check(q)
+        found = self._rows(
+            ContactQueries.clearances, (np.atleast_2d(rows),), threads, executor, progress, kind=np.float64
+        )
+        return found if rows.ndim == 2 else found[0].item()
+
+    # Contacts.
+
+    def contacts(self, q: ArrayLike) -> list[Contact]:
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
+
+        Pairs that cannot move are included.
+        """
+        return self._queries.contacts(self._row(q))
+
+    def packed_contacts(
+        self,
+        q: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+    ) -> PackedContacts:
+        """Return the contacts of many configurations as arrays: those of `contacts`, row by row, in its order.
+
+        Contacts are found by Python code, one row at a time: processes make them quicker, threads hardly do.
+
+        Args:
+            q: Configurations, (n, dim).
+            threads: As for `in_collision`.
+            executor: As for `in_collision`.
+            progress: Show a progress bar on a terminal.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite.
+        """
+        rows = self.space.check(q)
+        if rows.ndim != 2:
+            raise ValueError(f"configurations of shape {rows.shape}; expected many, (n, {self.space.dim})")
+        parts: dict[int, PackedContacts] = {}
+
+        def store(where: slice, answers: PackedContacts) -> None:
+            parts[where.start] = answers
+
+        question = Question(packed, (rows,), (), self._queries.row_bytes())
+        ask(self._queries, question, store, threads, executor, progress)
+        return joined([parts[start] for start in sorted(parts)])
+
+    # Edges and paths.
+
+    def edge_in_collision(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        resolution: float | None = None,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+    ) -> Any:
+        """Return whether anything touches on the straight way between two configurations, ends included.
+
+        Args:
+            q0: Where the edges begin, (dim,) or (n, dim).
+            q1: Where they end, of the same shape.
+            resolution: Greatest distance in metres that any point of a robot moves between two checks; None takes
+                the file's PositionRes, else 0.01 extent.
+            threads: As for `in_collision`; edges count as rows.
+            executor: As for `in_collision`.
+            progress: Show a progress bar on a terminal.
+
+        Raises:
+            ValueError: q0 and q1 differ in shape, or the resolution is not positive.
+        """
+        start, delta = self._way(q0, q1)
+        extras = (self._queries.steps.resolution(resolution),)
+        columns = np.atleast_2d(start), np.atleast_2d(delta)
+        hits = self._rows(ContactQueries.edges_collide, columns, threads, executor, progress, extras)
+        return hits if start.ndim == 2 else hits[0].item()
+
+    def edge_is_free(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+    ) -> Any:
+        """Return whether nothing touches anywhere on the straight way between two configurations, proved.
+
+        True is a proof: distances along the way are compared with how far bodies can move (bounded as for
+        `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
+        than 1e-5 of the extent. Joint values in between are not rounded to any step.
+
+        Args:
+            q0: Where the edges begin, (dim,) or (n, dim).
+            q1: Where they end, of the same shape.
+            threads: As for `in_collision`; edges count as rows.
+            executor: As for `in_collision`.
+            progress: Show a progress bar on a terminal.
+
+        Raises:
+            ValueError: q0 and q1 differ in shape.
+        """
+        start, delta = self._way(q0, q1)
+        columns = np.atleast_2d(start), np.atleast_2d(delta)
+        free = self._rows(ContactQueries.edges_are_free, columns, threads, executor, progress)
+        return free if start.ndim == 2 else free[0].item()
+
+    def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
+        """Check the validity of a path's configurations and of the straight edges between them.
+
+        Args:
+            path: (k, dim).
+            resolution: As for `edge_in_collision`.
+
+        Raises:
+            ValueError: The path has a wrong shape, or the resolution is not positive.
+        """
+        queries = self._queries
+        return check_path(path, queries.steps, queries.validities, self.contacts, self.space, resolution)
+
+    # What they share.
+
+    def _at_once(self, q: ArrayLike) -> Array | None:
+        """Return a single good row as (1, dim); None for anything else, which takes the long way.
+
+        A verdict may take less than a microsecond: this check is what of it can be made quick.
+        """
+        # A sum is finite if its terms are; the few that are not although theirs are take the long way, too.
+        if type(q) is np.ndarray and q.shape == self._one_row and q.dtype is _FLOAT and isfinite(sum(q.tolist())):
+            return q[None]
+        return None
+
+    def _verdicts(
+        self,
+        function: Callable[..., Any],
+        q: ArrayLike,
+        threads: int | None,
+        executor: Executor | None,
+        progress: bool,
+        engine: Engine | None,
+    ) -> Any:
+        if engine is not None and engine not in _ENGINES:
+            raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, _ENGINES))}")
+        rows = self.space.check(q)
+        row_bytes = self._queries.row_bytes(engine, verdicts=True)
+        found = self._rows(
+            function, (np.atleast_2d(rows),), threads, executor, progress, (engine,), row_bytes=row_bytes
+        )
+        return found if rows.ndim == 2 else found[0].item()
+
+    def _rows(
+        self,
+        function: Callable[..., Any],
+        columns: tuple[Array, ...],
+        threads: int | None,
+        executor: Executor | None,
+        progress: bool,
+        extras: tuple[Any, ...] = (),
+        *,
+        kind: type[np.generic] = np.bool_,
+        shape: tuple[int, ...] | None = None,
+        row_bytes: int | None = None,
+    ) -> NDArray[Any]:
+        """Return one answer for each row, each a `kind`, or an array of floats of this shape."""
+        count = len(columns[0])
+        answers = np.empty((count, *shape) if shape else count, dtype=np.float64 if shape else kind)
+
+        def store(where: slice, some: NDArray[Any]) -> None:
+            answers[where] = some
+
+        question = Question(function, columns, extras, row_bytes or self._queries.row_bytes())
+        ask(self._queries, question, store, threads, executor, progress)
+        return answers
+
+    def _row(self, q: ArrayLike) -> Array:
+        row = self.space.check(q)
+        if row.ndim != 1:
+            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
+        return row
+
+    def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
+        """Return where ways begin, and where they lead from there."""
+        start, end = self.space.check(q0), self.space.check(q1)
+        if start.shape != end.shape:
+            raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
+        return start, self.space.difference(start, end)
