@@ -264,9 +264,9 @@ def test_what_is_not_there_yet_says_so(options: dict[str, str], value: str) -> N
         env2mjcf.load(MODELS / "seed/seed.env", **options)
 
 
-def test_queries_that_are_not_there_yet_say_so(cubes: env2mjcf.Scene) -> None:
+def test_an_executor_must_be_one(cubes: env2mjcf.Scene) -> None:
     for query in (cubes.in_collision, cubes.is_valid, cubes.clearance):
-        with pytest.raises(NotImplementedError, match="executor"):
+        with pytest.raises(TypeError, match="ProcessPoolExecutor"):
             query(at(0, 0, 0), executor=object())
 
 

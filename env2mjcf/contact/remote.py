@@ -133,8 +133,8 @@ def worker_count(executor: Any) -> int:
     count = getattr(executor, "_max_workers", None)
     if isinstance(count, int):
         return max(1, count)
-    nthreads: Any = getattr(getattr(executor, "_client", None), "nthreads", None)  # of Dask
-    return max(1, sum(nthreads().values())) if callable(nthreads) else _WORKERS
+    client: Any = getattr(executor, "_client", None)  # of Dask
+    return max(1, sum(client.nthreads().values())) if hasattr(client, "nthreads") else _WORKERS
 
 
 def on_executor(
