@@ -160,4 +160,5 @@ CATALOGUE: dict[str, str] = {
     "CFG506": "The rows of a query are built in different ways.",
     "CFG507": "Velocities or info fields behind configurations are not used.",
     "CFG508": "A query holds one configuration only.",
+    "CFG509": "The output of a batch cannot be written.",
 }

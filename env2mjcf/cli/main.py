@@ -24,6 +24,7 @@ VERBS = {
     "info": ("info", "Info", "say what a scene holds and how it is read"),
     "check": ("check", "Check", "tell whether configurations are valid, and who touches whom"),
     "lint": ("lint", "Lint", "list everything doubtful in scenes, robots and meshes"),
+    "batch": ("batch", "Batch", "write verdicts on files of configurations, larger than memory if need be"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 

@@ -1,0 +1,48 @@
+"""How far a long job is, and how quick: a bar on a terminal, now and then a line in a log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from tqdm import tqdm
+
+# Seconds between two lines.
+_INTERVAL = 30.0
+
+
+class Meter:
+    """Shows progress on stderr while it is entered."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._began = self._shown = 0.0
+        self._first = self._done = self._rows = 0
+
+    def __enter__(self) -> Meter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+        elif self._began:
+            self._line()
+
+    def at(self, done: int, rows: int) -> None:
+        """Show that so many of the rows are done; those of the first call have cost nothing."""
+        now = time.monotonic()
+        if not self._began:
+            self._began, self._shown, self._first = now, now, done
+            if sys.stderr.isatty():
+                self._bar = tqdm(total=rows, initial=done, unit=" rows", unit_scale=True, mininterval=0.2)
+        self._done, self._rows = done, rows
+        if self._bar is not None:
+            self._bar.update(done - self._bar.n)
+        elif now - self._shown > _INTERVAL:
+            self._shown = now
+            self._line()
+
+    def _line(self) -> None:
+        rate = (self._done - self._first) / max(time.monotonic() - self._began, 1e-9)
+        print(f"env2mjcf: {self._done:,} of {self._rows:,} rows, {rate:,.0f} a second", file=sys.stderr)
