@@ -188,10 +188,25 @@ class TestResuming:
             run(scene, "q.npy", "v.npy", advance=another)
 
 
+@pytest.mark.slow
 def test_a_killed_run_is_resumed_and_every_verdict_right(scene, tmp_path) -> None:
     """SIGKILL leaves no chance to tidy up."""
-    q = saved(scene, 1_000_000)
-    words = [sys.executable, "-m", "env2mjcf", "batch", "scene.env", "q.npy", "-o", "v.npy", "--engine", "mujoco"]
+    q = saved(scene, 1_000_000).astype(np.float32)
+    np.save("q.npy", q)
+    words = [
+        sys.executable,
+        "-m",
+        "env2mjcf",
+        "batch",
+        "scene.env",
+        "q.npy",
+        "-o",
+        "v.npy",
+        "--engine",
+        "mujoco",
+        "--threads",
+        "1",
+    ]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     child = subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     try:

@@ -69,7 +69,10 @@ def test_clearances_edges_and_contacts_are_the_same_numbers(cubes: env2mjcf.Scen
     swept = cubes.edge_in_collision(q, to)
     assert 0 < swept.sum() < 60
     np.testing.assert_array_equal(cubes.edge_in_collision(q, to, executor=executor), swept)
-    assert cubes.edge_in_collision(q, to, 100.0, executor=executor).sum() < swept.sum()
+    over, under = np.array([2.0, 0, 4, 0, 0, 0]), np.array([2.0, 0, -4, 0, 0, 0])
+    assert cubes.edge_in_collision(over, under, executor=executor) is True
+    # At this resolution the ends alone are looked at.
+    assert cubes.edge_in_collision(over, under, 100.0, executor=executor) is False
     np.testing.assert_array_equal(cubes.edge_is_free(q, to, executor=executor), cubes.edge_is_free(q, to))
     there, here = cubes.packed_contacts(q, executor=executor), cubes.packed_contacts(q)
     for name in ("offsets", "pair", "position", "normal", "distance"):

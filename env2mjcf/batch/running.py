@@ -30,7 +30,7 @@ _SECONDS = 5.0
 _FIRST, _GROWTH = 10_000, 8
 _BYTES = 64_000_000
 # What a crash may cost.
-_COMMIT_SECONDS = 2.0
+_COMMIT_SECONDS = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,8 +86,8 @@ def ask(
         TypeError: The executor is none.
     """
     rows = question.rows
-    bar = tqdm(total=rows, unit="q", delay=1, leave=False) if progress and sys.stderr.isatty() else None
     count = thread_count(threads, rows)
+    bar = tqdm(total=rows, unit="q", delay=1, leave=False) if progress and sys.stderr.isatty() else None
     try:
         if executor is not None:
             workers = worker_count(executor) if threads is None else count
