@@ -39,6 +39,7 @@ examples:
   env2mjcf info scene.env                         what is in it
   env2mjcf convert scene.env out/                 out/scene.xml, for MuJoCo
   env2mjcf check scene.env --query scene.query    are start and goal free
+  env2mjcf batch scene.env q.npy -o hits.npy      millions of verdicts
   env2mjcf lint scenes/                           what is doubtful in a folder
   env2mjcf convert --help                         all options of a verb
 
