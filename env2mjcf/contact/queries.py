@@ -160,8 +160,11 @@ class ContactQueries:
                     self._exact = ExactEngine(self._assembly, self._space, self._moving, self._surfaces)
         return self._exact
 
-    def contacts(self, row: Array) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
+    def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches; none if none does."""
+        exact = self._chosen(engine)
+        if exact is not None and not self.collisions(row[None], engine)[0]:
+            return []
         found: dict[int, list[Touch]] = {}
         for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
             index = self._pair_of[frozenset((a, b))]
@@ -172,11 +175,14 @@ class ContactQueries:
         for contact in self._static:
             index = self._pair_of[frozenset((contact.link, contact.other))]
             found.setdefault(index, []).append(Touch(contact.position, contact.normal, contact.distance))
-        if not found and not self._containment.needed:
+        if not found and exact is None and not self._containment.needed:
             return []
         poses = self._poses_by_name(row[None])
-        contained = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
-        return self._triangles.manifolds.contacts(found, contained, poses)
+        others = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
+        if not found and not others and exact is not None:
+            # Within the band of contact, cells may part what triangles say touches.
+            others = self._triangles.clearance.nearest_pairs(poses)
+        return self._triangles.manifolds.contacts(found, others, poses)
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)

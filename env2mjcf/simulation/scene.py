@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -174,6 +175,21 @@ class Scene:
 
     # Verdicts.
 
+    def warm_up(self, *, wait: bool = True) -> float:
+        """Make ready what the first query would have to wait for; return the seconds that it took.
+
+        The exact engine is compiled at its first use, and kept on disk for later ones.
+
+        Args:
+            wait: False works in a thread of its own, and returns 0.0 at once.
+        """
+        if not wait:
+            threading.Thread(target=self._queries.warm_up, name="env2mjcf-warm-up", daemon=True).start()
+            return 0.0
+        start = time.perf_counter()
+        self._queries.warm_up()
+        return time.perf_counter() - start
+
     def in_collision(
         self,
         q: ArrayLike,
@@ -226,12 +242,13 @@ class Scene:
 
         return self._scalar_or_rows(q, answer)
 
-    def contacts(self, q: ArrayLike) -> list[Contact]:
+    def contacts(self, q: ArrayLike, *, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
 
-        Pairs that cannot move are included.
+        There are some just where `in_collision` says so. Pairs that cannot move are included. Places, normals and
+        depths come from MuJoCo and from triangles, whichever engine says that there are any.
         """
-        return self._queries.contacts(self._row(q))
+        return self._queries.contacts(self._row(q), engine)
 
     def clearance(
         self,
