@@ -32,10 +32,12 @@ def lane_gaps(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1:
         g0 = larger(abs(x) - (a0 + s00 * b0 + s01 * b1 + s02 * b2), 0.0)
         g1 = larger(abs(y) - (a1 + s10 * b0 + s11 * b1 + s12 * b2), 0.0)
         g2 = larger(abs(z) - (a2 + s20 * b0 + s21 * b1 + s22 * b2), 0.0)
-        h0 = larger(abs(r00 * x + r10 * y + r20 * z) - (b0 + u0), 0.0)
-        h1 = larger(abs(r01 * x + r11 * y + r21 * z) - (b1 + u1), 0.0)
-        h2 = larger(abs(r02 * x + r12 * y + r22 * z) - (b2 + u2), 0.0)
-        out[k] = larger(g0 * g0 + g1 * g1 + g2 * g2, h0 * h0 + h1 * h1 + h2 * h2)
+        u, v, w = abs(r00 * x + r10 * y + r20 * z), abs(r01 * x + r11 * y + r21 * z), abs(r02 * x + r12 * y + r22 * z)
+        h0, h1, h2 = larger(u - (b0 + u0), 0.0), larger(v - (b1 + u1), 0.0), larger(w - (b2 + u2), 0.0)
+        # Along the line between the middles.
+        away = x * x + y * y + z * z + _TINY
+        gap = larger(away - (a0 * abs(x) + a1 * abs(y) + a2 * abs(z) + b0 * u + b1 * v + b2 * w), 0.0)
+        out[k] = larger(larger(g0 * g0 + g1 * g1 + g2 * g2, h0 * h0 + h1 * h1 + h2 * h2), gap * gap / away)
 
 
 @compiled
