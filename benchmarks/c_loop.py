@@ -86,4 +86,6 @@ def _compiled(scene: env2mjcf.Scene, *, bodies: bool) -> mujoco.MjModel:
         vfs["model.xml"] = etree.tostring(root)
         for name, data in scene.assets.items():
             vfs[name] = data
-        return mujoco.MjSpec.from_file("model.xml", vfs=vfs).compile()
+        spec = mujoco.MjSpec.from_file("model.xml", vfs=vfs)
+    spec.assets = {Path(n).name: d for n, d in scene.assets.items() if not n.endswith(".xml")}
+    return spec.compile()

@@ -102,7 +102,7 @@ def maze_copies(folder: Path, maze: Case, copies: int) -> Case:
     path = folder / f"maze{copies}.env"
     path.write_text("\n".join(text), encoding="utf-8")
     options: dict[str, Any] = {"robots": maze.options["robots"], "mesh_dirs": [maze.path.parent], "allow_outside": True}
-    return Case(f"maze, {copies} copies", path, options)
+    return Case(f"maze{copies}", path, options)
 
 
 def tile_offsets(copies: int) -> Points:

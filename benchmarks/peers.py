@@ -120,6 +120,7 @@ class Coal:
         self.geometries = [bvh(parts[n].mesh) for n in self.pairs.names]
         self.transforms = [[coal.Transform3s(p[:3, :3], p[:3, 3]) for p in row] for row in scene.link_poses(rows)]
         self.fixed = [coal.Transform3s(p[:3, :3], p[:3, 3]) for p in scene.obstacle_poses()]
+        self._managers: dict[str, coal.BroadPhaseCollisionManager] = {}
         links = self.pairs.links
         self.request, self.distance_request = coal.CollisionRequest(), coal.DistanceRequest()
         self.request.enable_contact = False
@@ -212,13 +213,13 @@ class Coal:
             found |= {f"coal {kind}": functools.partial(self.managed_distances, kind=kind) for kind in MANAGERS}
         return found
 
-    @functools.cache
     def _manager(self, kind: str) -> coal.BroadPhaseCollisionManager:
-        manager = getattr(coal, kind)()
-        for thing in self.obstacles:
-            manager.registerObject(thing)
-        manager.setup()
-        return manager
+        if kind not in self._managers:
+            manager = self._managers[kind] = getattr(coal, kind)()
+            for thing in self.obstacles:
+                manager.registerObject(thing)
+            manager.setup()
+        return self._managers[kind]
 
 
 def bvh(mesh: object) -> coal.BVHModelOBBRSS:

@@ -26,8 +26,8 @@ class Pinocchio:
         self.model, frames, columns = _joints(scene.model)
         self.geometry = _geometry(scene, frames)
         self.qpos = np.ascontiguousarray(scene.space.qpos(rows)[:, columns])
+        # Its requests are without contacts unless one asks for them.
         self.data, self.placed = self.model.createData(), self.geometry.createData()
-        _without_contacts(self.placed)
         self._check(scene, rows[0])
 
     def ways(self) -> dict[str, Callable[[slice], np.ndarray]]:
@@ -111,11 +111,6 @@ def _geometry(scene: env2mjcf.Scene, frames: dict[int, tuple[int, pin.SE3]]) -> 
     for a, b in scene.pairs:
         geometry.addCollisionPair(pin.CollisionPair(numbers[a], numbers[b]))
     return geometry
-
-
-def _without_contacts(placed: pin.GeometryData) -> None:
-    for request in placed.collisionRequests:
-        request.enable_contact = False
 
 
 def _se3(position: np.ndarray, quaternion: np.ndarray) -> pin.SE3:
