@@ -15,7 +15,9 @@ from lxml import etree
 
 import env2mjcf
 
+# One contact a pair is enough for a verdict.
 _ONE_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+_LIBCCD = int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
 
 
 @functools.cache
@@ -64,14 +66,25 @@ class CLoop:
         return hits
 
 
+def with_verdict_settings(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a model with the settings of env2mjcf's own verdicts: one contact a pair, found by libccd."""
+    copied = copy.copy(model)
+    copied.opt.disableflags |= _ONE_CONTACT | _LIBCCD
+    return copied
+
+
 def layouts(scene: env2mjcf.Scene) -> dict[str, mujoco.MjModel]:
     """Return models of the scene's geometry that MuJoCo may be quicker on than on the one that is written."""
-    verdicts = copy.copy(scene._queries._engine._model)
-    bare = _compiled(scene, bodies=False)
-    static = _compiled(scene, bodies=True)
+    bare, static = _compiled(scene, bodies=False), _compiled(scene, bodies=True)
     for model in (bare, static):
         model.opt.disableflags |= _ONE_CONTACT
-    return {"verdicts' settings": verdicts, "bare": bare, "static bodies": static}
+    return {
+        "libccd": with_verdict_settings(scene.model),
+        "bare": bare,
+        "bare, libccd": with_verdict_settings(bare),
+        "static bodies": static,
+        "static bodies, libccd": with_verdict_settings(static),
+    }
 
 
 def _compiled(scene: env2mjcf.Scene, *, bodies: bool) -> mujoco.MjModel:

@@ -10,8 +10,6 @@ from truth import BAND, Truth
 
 import env2mjcf
 
-# How far a disagreement is from the triangles takes long to find out; of more than this many some are looked at.
-_LOOKED_AT = 40
 # Poses that are held at once.
 _BODIES_TIMES_ROWS = 300_000
 
@@ -68,12 +66,13 @@ class Judged:
         """Return the share of configurations in collision."""
         return float((self._surface if mode == "surface" else self._solid)[half].mean())
 
-    def compare(self, verdicts: Mapping[str, np.ndarray], mode: str) -> Disagreements:
+    def compare(self, verdicts: Mapping[str, np.ndarray], mode: str, most: int) -> Disagreements:
         """Compare verdicts on the first rows of each half.
 
         Args:
             verdicts: By half.
             mode: "surface" or "solid"; "either" where surfaces and solids may disagree and neither is wrong.
+            most: Of how many disagreements it is found out how far off they are, which takes long.
         """
         asked, wrong = 0, []
         for half, answers in verdicts.items():
@@ -82,7 +81,7 @@ class Judged:
             counted = surface == solid if mode == "either" else np.ones(len(answers), dtype=bool)
             asked += int(counted.sum())
             wrong += [(self._rows[half][i], bool(answers[i])) for i in np.flatnonzero(counted & (answers != expected))]
-        chosen = np.random.default_rng(0).permutation(len(wrong))[:_LOOKED_AT]
+        chosen = np.random.default_rng(0).permutation(len(wrong))[:most]
         kind = "surface" if mode == "surface" else "auto"
         outside = sum(self._share(*wrong[i], kind) > BAND for i in chosen)
         return Disagreements(asked, len(wrong), len(chosen), outside)

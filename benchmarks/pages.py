@@ -2,11 +2,45 @@
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 BEGIN, END = "<!-- written by hand: begin -->", "<!-- written by hand: end -->"
 _EMPTY = "\n\n## Where the time goes\n\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A figure that has a mark: what is asked for, of which scene, what it is, and the most that it may be."""
+
+    what: str
+    scene: str
+    value: float
+    most: float
+
+    @property
+    def met(self) -> bool:
+        """Whether it is."""
+        return self.value <= self.most
+
+
+def summary(checks: Sequence[Check]) -> list[str]:
+    """Return a table of what is met: a line for each kind of mark, with all the scenes that miss it."""
+    kinds: dict[str, list[Check]] = collections.defaultdict(list)
+    for check in checks:
+        kinds[check.what].append(check)
+    rows = []
+    for what, found in kinds.items():
+        missed = sorted((c for c in found if not c.met), key=_by_how_much, reverse=True)
+        names = ", ".join(f"{c.scene} ({c.value:.3g}, mark {c.most:g})" for c in missed)
+        rows.append((what, f"{len(found) - len(missed)} of {len(found)}", names))
+    return table(("mark", "met", "missed by"), rows)
+
+
+def _by_how_much(check: Check) -> float:
+    return check.value / check.most if check.most else check.value
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from c_loop import CLoop, layouts
 from judged import Disagreements
-from pages import mark, micro, table
+from pages import Check, mark, micro, table
 from peers import Coal, Fcl
 from pinocchio_peer import Pinocchio
 from rounds import Race, Way, quickest_kind, race
@@ -20,6 +20,8 @@ SURFACE, AUTO, MUJOCO, WRITTEN, BEST = "surface", "auto", "mujoco engine", "C as
 PEERS = ("fcl pairs", "fcl manager", "coal pairs", "coal manager")
 PINOCCHIO = ("pin rows", "pin batch")
 SOLID_MARK = 1.3
+# Disagreements of which it is found out how far off they are: of our own ways all but for very many.
+_LOOKED_AT, _LOOKED_AT_OF_OURS = 40, 2000
 
 LEGEND = """
 CPU time of one thread, microseconds a query, both halves together; medians over {rounds} rounds in which all ways take
@@ -30,8 +32,9 @@ turns in one process. A ratio is the median of the rounds' ratios, with the leas
   mujoco engine: `collision="auto", engine="mujoco"`. Kinematics is in all of these.
 - C as written: mj_kinematics and mj_collision on the scene's own `auto` model, called by address from a loop that numba
   compiles; it looks for all contacts, does not look for containment and is not called from Python. C best: the same on
-  the quickest of other models of the same geometry: with the settings of env2mjcf's verdicts; bare (one contact a pair,
-  nothing that is only drawn); static bodies (bare, each obstacle a body instead of geoms of the world).
+  the quickest of other models of the same geometry: libccd (one contact a pair, not by MuJoCo's native algorithm); bare
+  (one contact a pair, nothing that is only drawn), and with libccd; static bodies (bare, each obstacle a body instead
+  of geoms of the world), and with libccd.
 - fcl, coal: python-fcl and coal from a Python loop, triangles alone, poses and transforms made beforehand and not
   counted; done at the first contact. Pair by pair, or with a broadphase manager of the obstacles (coal's: the quickest
   of six kinds); links among each other pair by pair. pin: pinocchio with coal on the same triangles, kinematics
@@ -122,11 +125,12 @@ def _disagreements(subject: Subject, found: Race, name: str, way: Way) -> Disagr
         half: np.asarray(way(judged.part(half, turns[name].rows)), dtype=bool) for half, turns in found.turns.items()
     }
     mode = {AUTO: "solid", MUJOCO: "solid", WRITTEN: "either", BEST: "either"}.get(name, "surface")
-    return judged.compare(verdicts, mode)
+    most = _LOOKED_AT_OF_OURS if name in (SURFACE, AUTO, MUJOCO) else _LOOKED_AT
+    return judged.compare(verdicts, mode, most)
 
 
-def text(results: Sequence[Result], rounds: int, rows: int, band: float) -> list[str]:
-    """Return the section of the page."""
+def text(results: Sequence[Result], rounds: int, rows: int, band: float) -> tuple[list[str], list[Check]]:
+    """Return the section of the page, and what is met."""
     engine = results[0].engine
     legend = [*LEGEND.format(rounds=rounds, engine=engine).strip().splitlines(), ""]
     ratio_legend = [*RATIO_LEGEND.format(solid=SOLID_MARK).strip().splitlines(), ""]
@@ -147,7 +151,20 @@ def text(results: Sequence[Result], rounds: int, rows: int, band: float) -> list
     parts += ["", "### Disagreements", "", *wrong_legend]
     header = ("scene", "configurations", *ways)
     parts += table(header, [_wrong(r, ways) for r in results])
-    return [*parts, ""]
+    return [*parts, ""], [check for r in results for check in _checks(r)]
+
+
+def _checks(result: Result) -> Iterable[Check]:
+    found, marks, name = result.race, result.subject.mark, result.name
+    if marks.peers:
+        ratio = found.ratio(SURFACE, found.quickest(PEERS)).median
+        yield Check("surface / quicker of coal and python-fcl", name, ratio, marks.peers)
+    yield Check("auto / surface", name, found.ratio(AUTO, SURFACE).median, SOLID_MARK)
+    yield Check("auto / MuJoCo's C loop as written", name, found.ratio(AUTO, WRITTEN).median, marks.c_loop)
+    yield Check("auto / MuJoCo's C loop, best layout", name, found.ratio(AUTO, BEST).median, marks.c_loop)
+    for way in (SURFACE, AUTO, MUJOCO):
+        if way in result.wrong:
+            yield Check(f"wrong verdicts outside the band, {way}", name, result.wrong[way].outside, 0)
 
 
 def _times(result: Result, ways: Iterable[str], half: str | None) -> tuple[str, ...]:

@@ -17,8 +17,10 @@ import numpy as np
 # A way answers a slice of the rows that it was made for.
 Way = Callable[[slice], object]
 
-# Rows on which it is found out how long a way takes, and the fewest that a turn may have.
-_TRIAL, _LEAST = 60, 300
+# Rows, at most, on which it is found out how long a way takes, and for about how many seconds.
+_TRIAL, _TRIAL_SECONDS = 60, 0.3
+# The fewest rows that a turn may have.
+_LEAST = 300
 # A turn lasts about this long, in seconds, unless its fewest rows last longer; one that lasts too long is left out.
 _TURN, _LONGEST_TURN = 0.08, 3.0
 
@@ -83,11 +85,11 @@ class Ratio:
 
 def trial(way: Way, part: slice) -> float:
     """Return about how many CPU seconds a row takes; the way is warm afterwards."""
-    few = slice(part.start, min(part.stop, part.start + _TRIAL))
-    way(slice(part.start, part.start + 1))
-    start = time.process_time()
-    way(few)
-    return max((time.process_time() - start) / (few.stop - few.start), 1e-9)
+    one = slice(part.start, part.start + 1)
+    way(one)
+    first = _seconds(way, Turn(one, 1))
+    rows = int(np.clip(_TRIAL_SECONDS / max(first, 1e-9), 3, _TRIAL))
+    return max(_seconds(way, Turn(slice(part.start, min(part.stop, part.start + rows)), 1)), 1e-9)
 
 
 def quickest_kind(ways: Mapping[str, Way], halves: Mapping[str, slice]) -> str:
@@ -99,7 +101,14 @@ def quickest_kind(ways: Mapping[str, Way], halves: Mapping[str, slice]) -> str:
     return min(ways, key=lambda name: seconds(ways[name]))
 
 
-def race(ways: Mapping[str, Way], halves: Mapping[str, slice], rounds: int, *, needed: Sequence[str] = ()) -> Race:
+def race(
+    ways: Mapping[str, Way],
+    halves: Mapping[str, slice],
+    rounds: int,
+    *,
+    needed: Sequence[str] = (),
+    least: int = _LEAST,
+) -> Race:
     """Let all ways take turns on all halves.
 
     Args:
@@ -107,16 +116,17 @@ def race(ways: Mapping[str, Way], halves: Mapping[str, slice], rounds: int, *, n
         halves: Rows by the name of their kind.
         rounds: How often.
         needed: Ways that are never left out, however long they take.
+        least: The fewest rows that a turn may have.
     """
     turns: dict[str, dict[str, Turn]] = {half: {} for half in halves}
     left_out: dict[str, float] = {}
     for name, way in ways.items():
         costs = {half: trial(way, part) for half, part in halves.items()}
-        if max(costs.values()) * _LEAST > _LONGEST_TURN and name not in needed:
+        if max(costs.values()) * least > _LONGEST_TURN and name not in needed:
             left_out[name] = float(np.mean(list(costs.values())))
             continue
         for half, part in halves.items():
-            turns[half][name] = _turn(costs[half], part)
+            turns[half][name] = _turn(costs[half], part, least)
     times: dict[str, dict[str, list[float]]] = {half: {name: [] for name in turns[half]} for half in halves}
     with no_collections():
         for number in range(rounds):
@@ -146,9 +156,9 @@ def no_collections() -> Iterator[None]:
             gc.enable()
 
 
-def _turn(cost: float, part: slice) -> Turn:
+def _turn(cost: float, part: slice, least: int) -> Turn:
     length = part.stop - part.start
-    rows = int(np.clip(_TURN / cost, min(_LEAST, length), length))
+    rows = int(np.clip(_TURN / cost, min(least, length), length))
     repeats = max(1, int(0.5 * _TURN / (cost * rows)))
     return Turn(slice(part.start, part.start + rows), repeats)
 
