@@ -92,6 +92,8 @@ def _compiled(scene: env2mjcf.Scene, *, bodies: bool) -> mujoco.MjModel:
     root = etree.fromstring(scene.xml.encode("utf-8"))
     root.find("compiler").set("discardvisual", "true")
     if bodies:
+        # Sweep-and-prune takes room for all pairs of bodies, and MuJoCo ends the process where there is none.
+        etree.SubElement(root, "size", memory="256M")
         # Obstacles stand in frames of the world; a frame that is called a body is one.
         for frame in root.find("worldbody").iterfind("frame"):
             frame.tag = "body"

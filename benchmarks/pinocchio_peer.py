@@ -108,8 +108,12 @@ def _geometry(scene: env2mjcf.Scene, frames: dict[int, tuple[int, pin.SE3]]) -> 
         )
         thing = pin.GeometryObject(name, joint, placement, bvh(parts[name].mesh))
         numbers[name] = geometry.addGeometryObject(thing)
+    # All at once: one by one, each is looked for among those that are there already.
+    tested = np.zeros((len(numbers), len(numbers)), dtype=bool)
     for a, b in scene.pairs:
-        geometry.addCollisionPair(pin.CollisionPair(numbers[a], numbers[b]))
+        tested[min(numbers[a], numbers[b]), max(numbers[a], numbers[b])] = True
+    geometry.setCollisionPairs(tested)
+    assert len(geometry.collisionPairs) == len(scene.pairs), "pinocchio tests other pairs"
     return geometry
 
 
