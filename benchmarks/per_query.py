@@ -43,9 +43,9 @@ turns in one process. A ratio is the median of the rounds' ratios, with the leas
   pinocchio use BVHModelOBBRSS and requests without contacts. A cell with (!) is of one short trial: too slow to race.
 """
 RATIO_LEGEND = """
-- surface / peers: to the quicker of coal and python-fcl, on both halves together, on the uniform and on the near half;
-  the mark is for both together. solid: auto / surface, mark {solid:g}. auto / C: to MuJoCo's C loop, as written and
-  best, and the mark that both are held to. surface / pin: to pinocchio's quickest way.
+- surface / peers: to the quicker of coal and python-fcl, whichever that is on both halves together, on the uniform and
+  on the near half; the mark is for both together. solid: auto / surface, mark {solid:g}. auto / C: to MuJoCo's C loop,
+  as written and best, and the mark that both are held to. surface / pin: to pinocchio's quickest way.
 """
 WRONG_LEGEND = """
 Verdicts unlike the triangles' (python-fcl; with containment by crossings of a ray where a way knows solids), and in
@@ -196,7 +196,7 @@ def _ratios(result: Result) -> tuple[str, ...]:
     halves = []
     for half in ("uniform", "near"):
         present = half in found.times
-        halves.append(str(found.ratio(SURFACE, found.quickest(PEERS, half), half).median)[:5] if present else "")
+        halves.append(f"{found.ratio(SURFACE, found.quickest(PEERS, half), half).median:.3g}" if present else "")
     solid = found.ratio(AUTO, SURFACE)
     written, quick = found.ratio(AUTO, WRITTEN), found.ratio(AUTO, BEST)
     pin = found.quickest(PINOCCHIO)

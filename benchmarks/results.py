@@ -54,6 +54,7 @@ class Size:
         batch_seconds: How long one thread may work on these.
         distances: Free configurations of each half for clearance.
         edges: Edges of a scene that are timed.
+        edges_seconds: How long one pass over these may take.
         certified: Certified edges that are looked at, of all scenes together.
         certified_seconds: How long one scene may take over these.
         memory: Queries of one process.
@@ -67,14 +68,15 @@ class Size:
     batch_seconds: float
     distances: int
     edges: int
+    edges_seconds: float
     certified: int
     certified_seconds: float
     memory: int
     memory_seconds: float
 
 
-FULL = Size(10_000, 11, 7, 1_000_000, 10.0, 1000, 400, 100_000, 300.0, 10_000_000, 300.0)
-QUICK = Size(500, 3, 3, 20_000, 0.5, 60, 40, 200, 5.0, 300_000, 5.0)
+FULL = Size(10_000, 11, 7, 1_000_000, 10.0, 1000, 400, 10.0, 100_000, 300.0, 10_000_000, 300.0)
+QUICK = Size(500, 3, 3, 20_000, 0.5, 60, 40, 2.0, 200, 5.0, 300_000, 5.0)
 
 
 class Run:
@@ -118,7 +120,9 @@ class Run:
     def edges(self) -> list[str]:
         """Return the section on edges."""
         size = self.size
-        found = self._each("edges", self.chosen, lambda s: edges.measure(s, size.slow_rounds, size.edges))
+        found = self._each(
+            "edges", self.chosen, lambda s: edges.measure(s, size.slow_rounds, size.edges, size.edges_seconds)
+        )
         wanted = -(-size.certified // max(1, len(found)))
         names = {r.name for r in found}
         provable = [s for s in self.chosen if s.name in names]
