@@ -150,7 +150,6 @@ class Coal:
         own = [(coal.ComputeCollision(self.geometries[a], self.geometries[b]), a, b) for a, b in self.pairs.own]
         hits = np.zeros(len(transforms), dtype=bool)
         for i, row in enumerate(transforms):
-            callback.init()
             for number in self.pairs.movers:
                 link = self.links[number]
                 link.setTransform(row[number])
@@ -194,13 +193,13 @@ class Coal:
         own = [(coal.ComputeDistance(self.geometries[a], self.geometries[b]), a, b) for a, b in self.pairs.own]
         least = np.full(len(transforms), np.inf)
         for i, row in enumerate(transforms):
-            callback.init()
             for number in self.pairs.movers:
                 link = self.links[number]
                 link.setTransform(row[number])
                 link.computeAABB()
+                # The manager begins anew with every link.
                 manager.distance(link, callback)
-            least[i] = callback.data.result.min_distance
+                least[i] = min(least[i], callback.data.result.min_distance)
             for distance, a, b in own:
                 result.clear()
                 least[i] = min(least[i], distance(row[a], row[b], self.distance_request, result))
