@@ -1,10 +1,11 @@
-"""What a benchmark ran on."""
+"""What a benchmark ran on, and what else ran there."""
 
 from __future__ import annotations
 
 import importlib.metadata
 import os
 import platform
+import time
 from pathlib import Path
 
 _PACKAGES = ("numpy", "numba", "mujoco", "coal", "python-fcl", "pin", "trimesh")
@@ -27,3 +28,27 @@ def _version(name: str) -> str:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return "missing"
+
+
+class ForeignLoad:
+    """What other processes take of the machine, from now on; processes of this one count when they have ended."""
+
+    def __init__(self) -> None:
+        self._start, self._busy, self._own = time.perf_counter(), _busy(), _own()
+
+    def share(self) -> float:
+        """Return their share of all processors' time."""
+        elapsed = (time.perf_counter() - self._start) * (os.cpu_count() or 1)
+        return max(0.0, (_busy() - self._busy - (_own() - self._own)) / elapsed)
+
+
+def _busy() -> float:
+    """Return seconds in which the machine's processors were not idle, since it started."""
+    user, nice, system, _, _, irq, softirq, steal = map(int, Path("/proc/stat").read_text().split()[1:9])
+    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+
+
+def _own() -> float:
+    """Return seconds that this process and those that it has waited for have taken."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

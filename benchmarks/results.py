@@ -30,7 +30,7 @@ import memory
 import per_query
 import scaling
 import threads
-from machine import machine
+from machine import ForeignLoad, machine
 from pages import Check, by_hand, summary
 from subjects import Subject, subjects
 from truth import BAND
@@ -158,16 +158,17 @@ class Run:
         return lines
 
 
-def page(run: Run, sections: Sequence[str], command: str, seconds: float) -> str:
-    """Return the whole page."""
+def page(run: Run, sections: Sequence[str], command: str) -> str:
+    """Measure, and return the whole page."""
+    start, load = time.perf_counter(), ForeignLoad()
     parts = [line for section in sections for line in getattr(run, section)() or ()]
     failures = ["## Failures", "", *(f"- {f}" for f in run.failures), ""] if run.failures else []
     return "\n".join(
         [
             "# Verdicts by the million: ratios of one run",
             "",
-            f"Made by `{command}`, with `ENV2MJCF_CORPUS` naming the folder of real scenes, on an otherwise idle "
-            "machine. Every ratio is of this run: all ways of a scene take turns in one process, beginning with "
+            f"Made by `{command}`, with `ENV2MJCF_CORPUS` naming the folder of real scenes. "
+            "Every ratio is of this run: all ways of a scene take turns in one process, beginning with "
             "another one in every round and going backwards every other time. One thread is one thread: the pools of "
             "BLAS and OpenMP are off. CPU time is the process's.",
             "",
@@ -190,20 +191,20 @@ def page(run: Run, sections: Sequence[str], command: str, seconds: float) -> str
             "",
             *parts,
             *failures,
-            f"The run took {seconds_text(time.perf_counter() - seconds)}.",
+            f"The run took {duration(time.perf_counter() - start)}; other processes took {100 * load.share():.0f} % of "
+            "the machine meanwhile.",
             "",
         ]
     )  # fmt: skip
 
 
-def seconds_text(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """Return a duration."""
     return f"{seconds / 60:.0f} minutes" if seconds > 120 else f"{seconds:.0f} seconds"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print and write the page; the exit status is 1 if something failed to be measured."""
-    start = time.perf_counter()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="few configurations and rounds; only print")
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="only these; only print")
@@ -224,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f"no such scene: {', '.join(unknown)}; choose from {', '.join(scenes)}")
         run = Run(scenes, size, chosen.scenes)
         words = ["python benchmarks/results.py", *(sys.argv[1:] if arguments is None else arguments)]
-        text = page(run, chosen.sections, " ".join(words), start)
+        text = page(run, chosen.sections, " ".join(words))
     print(text)
     whole = not chosen.quick and not chosen.scenes and set(chosen.sections) == set(SECTIONS)
     output = chosen.output or (OUTPUT if whole else None)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
+from machine import ForeignLoad
 from pages import Check, mark, micro, table
 from rounds import Ratio, no_collections
 from subjects import Subject, has_exact
@@ -81,16 +80,9 @@ def measure(subject: Subject, rounds: int, seconds: float, most: int) -> Result:
 
 def _wall(work: Callable[[], object]) -> tuple[float, float]:
     """Return seconds, and the share of the machine that other processes took meanwhile."""
-    start, own, busy = time.perf_counter(), time.process_time(), _busy()
+    start, load = time.perf_counter(), ForeignLoad()
     work()
-    elapsed, own, busy = time.perf_counter() - start, time.process_time() - own, _busy() - busy
-    return elapsed, max(0.0, (busy - own) / (elapsed * (os.cpu_count() or 1)))
-
-
-def _busy() -> float:
-    """Return seconds in which the machine's processors were not idle, since it started."""
-    user, nice, system, _, _, irq, softirq, steal = map(int, Path("/proc/stat").read_text().split()[1:9])
-    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+    return time.perf_counter() - start, load.share()
 
 
 def _alone(scene: env2mjcf.Scene, rows: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
