@@ -56,16 +56,27 @@ def box_gap(m: Pose, a: Any, b: Any) -> float:
 
 @compiled
 def triangle_gap(a: Triangle, row: Any) -> float:
-    """Return a lower bound of the squared distance of a triangle from those of a leaf: that of their boxes."""
+    """Return a lower bound of the squared distance of a triangle from those of a leaf.
+
+    That of their boxes, or the gap along the line between their middles.
+    """
+    c0, c1, c2 = a[0] + a[3] + a[6], a[1] + a[4] + a[7], a[2] + a[5] + a[8]
     low0, high0 = smaller(smaller(a[0], a[3]), a[6]), larger(larger(a[0], a[3]), a[6])
     low1, high1 = smaller(smaller(a[1], a[4]), a[7]), larger(larger(a[1], a[4]), a[7])
     low2, high2 = smaller(smaller(a[2], a[5]), a[8]), larger(larger(a[2], a[5]), a[8])
     least = _FAR
     for k in range(_BLOCK):
-        g0 = _interval_gap(low0, high0, row[k], row[12 + k], row[24 + k])
-        g1 = _interval_gap(low1, high1, row[4 + k], row[16 + k], row[28 + k])
-        g2 = _interval_gap(low2, high2, row[8 + k], row[20 + k], row[32 + k])
-        least = smaller(least, g0 * g0 + g1 * g1 + g2 * g2)
+        p0, p1, p2 = row[k], row[4 + k], row[8 + k]
+        q0, q1, q2 = row[12 + k], row[16 + k], row[20 + k]
+        r0, r1, r2 = row[24 + k], row[28 + k], row[32 + k]
+        g0 = _interval_gap(low0, high0, p0, q0, r0)
+        g1 = _interval_gap(low1, high1, p1, q1, r1)
+        g2 = _interval_gap(low2, high2, p2, q2, r2)
+        x, y, z = p0 + q0 + r0 - c0, p1 + q1 + r1 - c1, p2 + q2 + r2 - c2
+        near = smaller(smaller(x * p0 + y * p1 + z * p2, x * q0 + y * q1 + z * q2), x * r0 + y * r1 + z * r2)
+        u, v, w = x * a[0] + y * a[1] + z * a[2], x * a[3] + y * a[4] + z * a[5], x * a[6] + y * a[7] + z * a[8]
+        gap = larger(near - larger(larger(u, v), w), 0.0)
+        least = smaller(least, larger(g0 * g0 + g1 * g1 + g2 * g2, gap * gap / _square(x, y, z)))
     return least
 
 
