@@ -29,9 +29,9 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
             second[_IS_SOLID] == 1 or not _box_in_box(inverted(m), b, a)
         )
     if first[_IS_BOX] == 1 and _counts_as_solid(first, a, b):
-        crosses = _box_crosses(tables, a, t, m, stack)
+        crosses = box_crosses(tables, a, 0.0, t, m, stack)
     elif second[_IS_BOX] == 1 and _counts_as_solid(second, b, a):
-        crosses = _box_crosses(tables, b, s, inverted(m), stack)
+        crosses = box_crosses(tables, b, 0.0, s, inverted(m), stack)
     else:
         crosses = _trees_cross(tables, s, t, m, stack)
     if crosses:
@@ -58,9 +58,9 @@ def _box_in_box(m: Pose, a: Any, b: Any) -> bool:
 
 
 @compiled
-def _box_crosses(tables: Tables, half: Any, t: int, m: Pose, stack: Any) -> bool:
-    """Return whether a solid box meets any triangle of shape t, at pose m in the box's frame."""
-    h0, h1, h2 = half[0], half[1], half[2]
+def box_crosses(tables: Tables, half: Any, grown: float, t: int, m: Pose, stack: Any) -> bool:
+    """Return whether a solid box, grown on all sides, meets any triangle of shape t, at pose m in the box's frame."""
+    h0, h1, h2 = half[0] + grown, half[1] + grown, half[2] + grown
     stack[0] = tables.shapes[t, _START]
     count = 1
     while count > 0:
