@@ -1,4 +1,4 @@
-"""Mitred shells: where the cells of a closed non-convex mesh lie, and what they cover."""
+"""Shells: where the cells of a closed non-convex mesh lie, and what they cover."""
 
 from __future__ import annotations
 
@@ -233,19 +233,32 @@ def test_the_protrusion_test_sees_a_cell_that_sticks_out() -> None:
     assert protrusion(shape, [moved_out]) > 1e-8
 
 
-def test_a_box_in_a_corner_has_mitred_cells_of_known_volume() -> None:
-    """A frustum under each side of the channel: 45 degrees at right angles, straight down at reflex edges."""
-    _, pieces = lined(channel())
-    h = 0.02 * np.sqrt(16 + 9 + 9)
-    volumes = {tuple(np.round(p.polygon.normal, 9) + 0.0): [] for p in pieces}
+def volumes_by_normal(mesh: Mesh) -> dict[tuple[float, ...], list[float]]:
+    _, pieces = lined(mesh)
+    volumes: dict[tuple[float, ...], list[float]] = {}
     for p in pieces:
-        volumes[tuple(np.round(p.polygon.normal, 9) + 0.0)].append(hull_volume(p.vertices))
-    # The outer bottom of 4 x 3 loses h on all sides.
-    assert volumes[0, 0, -1] == [
-        pytest.approx(h / 6 * (12 + 4 * (4 - h) * (3 - h) + (4 - 2 * h) * (3 - 2 * h)), rel=1e-5)
-    ]
-    # The floor of the channel loses h at its two ends only.
-    assert any(v == pytest.approx(h * (4 - h), rel=1e-5) for v in volumes[0, 0, 1])
+        volumes.setdefault(tuple(np.round(p.polygon.normal, 9) + 0.0), []).append(hull_volume(p.vertices))
+    return volumes
+
+
+def test_cells_go_straight_down_at_right_and_reflex_edges() -> None:
+    """Slabs, which overlap at the corners of the channel as its walls do."""
+    volumes = volumes_by_normal(channel())
+    h = 0.02 * np.sqrt(16 + 9 + 9)
+    assert volumes[0, 0, -1] == [pytest.approx(12 * h, rel=1e-5)]
+    assert any(v == pytest.approx(4 * h, rel=1e-5) for v in volumes[0, 0, 1])
+
+
+def test_cells_follow_their_neighbours_at_acute_edges() -> None:
+    """A trough of which the long lower edges measure 45 degrees: the bottom recedes by its depth on two sides."""
+    section = np.array([[2, 0.9], [1, 1], [0, 0], [4, 0], [3, 1]])  # y, z; all is seen from the first corner
+    n = len(section)
+    corners = np.vstack([np.column_stack([np.full(n, x), section]) for x in (0.0, 5.0)])
+    cap = np.array([[0, i, i + 1] for i in range(1, n - 1)])
+    sides = [f for i in range(n) for j in [(i + 1) % n] for f in ([i, j, j + n], [i, j + n, i + n])]
+    mesh = Mesh.from_arrays("trough", corners, np.vstack([cap[:, ::-1], cap + n, sides]))
+    h = 0.02 * np.sqrt(16 + 25 + 1)
+    assert volumes_by_normal(mesh)[0, 0, -1] == [pytest.approx(5 * (4 * h - h**2), rel=1e-5)]
 
 
 @pytest.mark.parametrize("name", ["channel", "torus", "spiky", "star", "thin bottom"])

@@ -50,7 +50,7 @@ class Shells:
 
 
 def shells(analysis: Analysis, faces: Ints, thickness: float) -> Shells:
-    """Line the inside of a closed surface with convex cells that meet in bisector planes.
+    """Line the inside of a closed surface with convex cells, which overlap at its convex edges.
 
     Args:
         analysis: Of a `solid` mesh.

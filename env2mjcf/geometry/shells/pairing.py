@@ -1,4 +1,4 @@
-"""Which two faces bound the solid at an edge, and how the plane between their cells leans."""
+"""Which two faces bound the solid at an edge, and how the sides of their cells lean there."""
 
 from __future__ import annotations
 
@@ -28,11 +28,14 @@ class Sides:
 
 
 def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
-    """Find the partner of each face at each of its edges, and the plane that divides the solid between their cells.
+    """Find the partner of each face at each of its edges, and how the cell's side leans there.
 
-    The bisector plane of an edge with interior angle theta recedes by cot(theta / 2); at reflex, flat and open edges
-    the cell goes straight down. Where more than two faces meet, the partner of a face is the first one of opposite
-    direction that a rotation from the face into the solid finds.
+    Sides go straight down wherever the solid holds that: all but at acute edges, where they follow the partner's
+    face. So a cell fills the whole wedge at a convex edge, and its neighbour does too. Bisector planes between them
+    would make blades of the cells, and a blade that lies on a face bears it with normals that are far off.
+
+    Where more than two faces meet, the partner of a face is the first one of opposite direction that a rotation from
+    the face into the solid finds.
 
     Args:
         vertices: (n, 3).
@@ -54,8 +57,8 @@ def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
     order = np.lexsort((there, angle, here))
     first = order[np.concatenate([[True], np.diff(here[order]) > 0])[: len(order)]]
     slopes = np.zeros(faces.size)
-    convex = first[angle[first] < np.pi]
-    slopes[here[convex]] = 1 / np.tan(angle[convex] / 2)
+    acute = first[angle[first] < np.pi / 2]
+    slopes[here[acute]] = 1 / np.tan(angle[acute])
     links = np.stack([here[first] // 3, there[first] // 3], axis=1)
     return Sides(slopes.reshape(-1, 3), links, bool((angle > 2 * np.pi - _COINCIDENT).any()))
 

@@ -24,7 +24,7 @@ def fit(group: Group, triangles: Floats, blocking: Ints, kind: Ints, margin: flo
         triangles: (m, 3, 3).
         blocking: (m,) number of the solid that a triangle bounds; -1 for a cavity, which blocks every cell.
         kind: (g,) number of the solid that each cell is of; -1 for cells of a cavity, which every triangle blocks.
-        margin: Length by which a triangle may reach into a cell without being there.
+        margin: Length by which a triangle may reach through a cell's top or bottom without being there.
     """
     low, high = group.boxes()
     cell, other = near(low, high, triangles.min(axis=1), triangles.max(axis=1))

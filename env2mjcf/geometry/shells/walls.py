@@ -12,6 +12,11 @@ from ..polygons import Polygon
 from ..topology import Bools, Floats, Ints
 
 
+_SIDE_MARGIN = 0.01
+"""Margin of the sides in units of that of top and bottom. Polygons may be bent by the whole margin, sides follow their
+edges exactly; and what is overlooked where two sides meet at a sharp corner is many margins wide."""
+
+
 @dataclass(slots=True, eq=False)
 class Group:
     """Cells under g polygons of k corners each; `slopes`, `height` and `tilted` are still to be fitted.
@@ -53,7 +58,7 @@ class Group:
         return np.minimum(self.height, limits.min(axis=1))
 
     def planes(self, rows: Ints, margin: float) -> Floats:
-        """Return the planes (len(rows), k + 2, 4) of some cells, moved inward by a margin, about the cells' centres.
+        """Return the planes (len(rows), k + 2, 4) of some cells about their centres, moved inward by a margin.
 
         The last two are the polygon's own and the bottom; x . plane[:3] + plane[3] >= 0 inside.
         """
@@ -61,7 +66,7 @@ class Group:
         scale = np.sqrt(1 + slopes**2)
         sides = (self.inward[rows] + slopes[:, :, None] * normal[:, None]) / scale[:, :, None]
         # The edges' lines lie in the plane through the centre, so the slope does not enter their offsets.
-        offsets = self.reach[rows] / scale - margin
+        offsets = self.reach[rows] / scale - _SIDE_MARGIN * margin
         top = np.column_stack([-normal, np.full(len(rows), -margin)])
         bottom = np.column_stack([normal, self.height[rows] - margin])
         return np.concatenate([np.concatenate([sides, offsets[:, :, None]], axis=2), top[:, None], bottom[:, None]], 1)
