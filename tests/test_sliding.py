@@ -14,6 +14,7 @@ from scenes import write_scene
 import env2mjcf
 from env2mjcf.formats.byu import export_byu
 
+
 def plate(step: float) -> trimesh.Trimesh:
     """A plate of 2 x 1.2, 0.1 thick; its top is of uneven triangles, flat but for dents beside the middle.
 

@@ -11,7 +11,6 @@ from ..pieces import by_length, corner_loops
 from ..polygons import Polygon
 from ..topology import Bools, Floats, Ints
 
-
 _SIDE_MARGIN = 0.01
 """Margin of the sides in units of that of top and bottom. Polygons may be bent by the whole margin, sides follow their
 edges exactly; and what is overlooked where two sides meet at a sharp corner is many margins wide."""
