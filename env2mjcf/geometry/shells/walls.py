@@ -93,24 +93,27 @@ def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slop
     for members in by_length(loops):
         corners = vertices[np.array([loops[i] for i in members])]
         normals = np.array([polygons[i].normal for i in members])
-        centers = corners.mean(axis=1)
-        local = corners - centers[:, None]
-        along = np.roll(local, -1, axis=1) - local
-        inward = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
-        inward /= np.linalg.norm(inward, axis=2, keepdims=True)
-        out.append(
-            Group(
-                members=np.array(members, dtype=np.int64),
-                centers=centers,
-                corners=local,
-                normals=normals,
-                inward=inward,
-                reach=-np.einsum("gkj,gkj->gk", inward, local),
-                slopes=np.array([slopes[i] for i in members]),
-                height=np.full(len(members), cap),
-            )
-        )
+        out.append(group_of(np.array(members), corners, normals, np.array([slopes[i] for i in members]), cap))
     return out
+
+
+def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, height: float) -> Group:
+    """Set up a group from its polygons' corners (g, k, 3) in the mesh's frame, normals (g, 3) and slopes (g, k)."""
+    centers = corners.mean(axis=1)
+    local = corners - centers[:, None]
+    along = np.roll(local, -1, axis=1) - local
+    inward = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
+    inward /= np.linalg.norm(inward, axis=2, keepdims=True)
+    return Group(
+        members=members,
+        centers=centers,
+        corners=local,
+        normals=normals,
+        inward=inward,
+        reach=-np.einsum("gkj,gkj->gk", inward, local),
+        slopes=slopes,
+        height=np.full(len(members), height),
+    )
 
 
 def _loop_slopes(
