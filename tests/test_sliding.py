@@ -49,7 +49,21 @@ def notched_box() -> trimesh.Trimesh:
     return voxels([np.array([-0.1, -0.04, 0.04, 0.1]), np.array([-0.1, 0.1]), np.array([-0.1, 0.0, 0.1])], filled)
 
 
-SLIDERS = {"box": trimesh.creation.box((0.2, 0.2, 0.2)), "notched": notched_box(), "table": table(0.2, 0.2, 0.2, 0.04)}
+def tapered(mesh: trimesh.Trimesh, growth: float) -> trimesh.Trimesh:
+    """Wider by `growth` at its top than at its bottom, which is as wide as before."""
+    corners = mesh.vertices.copy()
+    corners[:, :2] *= 1 + growth * (corners[:, 2:] - corners[:, 2].min()) / np.ptp(corners[:, 2])
+    return trimesh.Trimesh(corners, mesh.faces, process=False)
+
+
+SLIDERS = {
+    "box": trimesh.creation.box((0.2, 0.2, 0.2)),
+    "notched": notched_box(),
+    "acute": tapered(notched_box(), -0.6),
+    "obtuse": tapered(notched_box(), 0.6),
+    "table": table(0.2, 0.2, 0.2, 0.04),
+    "stool": tapered(table(0.2, 0.2, 0.2, 0.04), -0.4),
+}
 
 
 def sliding(folder: Path, slider: trimesh.Trimesh, turn: float, speed: float, step: float = 0.0) -> np.ndarray:

@@ -270,16 +270,29 @@ def test_cells_go_straight_down_at_right_and_reflex_edges() -> None:
     assert any(v == pytest.approx(4 * h, rel=1e-5) for v in volumes[0, 0, 1])
 
 
-def test_cells_follow_their_neighbours_at_acute_edges() -> None:
-    """A trough of which the long lower edges measure 45 degrees: the bottom recedes by its depth on two sides."""
-    section = np.array([[2, 0.9], [1, 1], [0, 0], [4, 0], [3, 1]])  # y, z; all is seen from the first corner
+@pytest.mark.parametrize("width", [4, 2], ids=["acute", "obtuse"])
+def test_cells_fill_the_wedges_at_convex_edges(width: float) -> None:
+    """A trough of which the long sides lean by 45 degrees: the cell under its bottom, w wide, ends at their planes."""
+    lean = (width - 3) / 1  # the rim is 3 apart, one above the bottom
+    section = np.array([[0, 0.9], [-1.5, 1], [-width / 2, 0], [width / 2, 0], [1.5, 1]])  # y, z; seen from the first
     n = len(section)
     corners = np.vstack([np.column_stack([np.full(n, x), section]) for x in (0.0, 5.0)])
     cap = np.array([[0, i, i + 1] for i in range(1, n - 1)])
     sides = [f for i in range(n) for j in [(i + 1) % n] for f in ([i, j, j + n], [i, j + n, i + n])]
     mesh = Mesh.from_arrays("trough", corners, np.vstack([cap[:, ::-1], cap + n, sides]))
-    h = 0.02 * np.sqrt(16 + 25 + 1)
-    assert volumes_by_normal(mesh)[0, 0, -1] == [pytest.approx(5 * (4 * h - h**2), rel=1e-5)]
+    h = 0.02 * mesh.diagonal
+    assert volumes_by_normal(mesh)[0, 0, -1] == [pytest.approx(5 * (width * h - lean * h**2 / 2), rel=1e-5)]
+
+
+def test_cells_go_straight_down_at_blunt_edges() -> None:
+    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab, wider at the groove."""
+    outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.2), (1.0, 1.4), (1.0, 2.4)]  # radius, height
+    drum = trimesh.creation.revolve([(0, 0), *outline, (0, 2.4)], sections=24)
+    volumes = volumes_by_normal(of_trimesh("drum", drum))
+    h, side = 0.02 * np.linalg.norm(np.ptp(drum.vertices, axis=0)), 2 * np.sin(np.pi / 24)
+    sides = [v for normal, found in volumes.items() if normal[2] == 0 for v in found]
+    assert len(sides) == 48
+    assert sides == pytest.approx([side * (h + h**2 / 2)] * 48, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", ["channel", "torus", "spiky", "star", "thin bottom"])

@@ -11,6 +11,9 @@ from ..pieces import by_length, corner_loops
 from ..polygons import Polygon
 from ..topology import Bools, Floats, Ints
 
+PARALLEL = 1e-9
+"""Sine of the angle between two edges below which they are taken for parallel."""
+
 _SIDE_MARGIN = 0.01
 """Margin of the sides in units of that of top and bottom. Polygons may be bent by the whole margin, sides follow their
 edges exactly; and what is overlooked where two sides meet at a sharp corner is many margins wide."""
@@ -30,7 +33,7 @@ class Group:
         normals: (g, 3).
         inward: (g, k, 3) unit vectors in the polygon's plane, square to the edge that begins at each corner.
         reach: (g, k) distance of the centre from each edge's line.
-        slopes: (g, k) how far each side recedes per unit of depth; not negative.
+        slopes: (g, k) how far each side recedes per unit of depth; negative where it leans outward.
         height: (g,).
         tilted: (g,) whether a side leans more than its edge asks for.
     """
@@ -71,10 +74,19 @@ class Group:
         return np.concatenate([np.concatenate([sides, offsets[:, :, None]], axis=2), top[:, None], bottom[:, None]], 1)
 
     def boxes(self) -> tuple[Floats, Floats]:
-        """Return the corners of boxes around the cells, (g, 3) each; sides never lean outward."""
-        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
-        down = -self.normals * self.height[:, None]
-        return self.centers + low + np.minimum(down, 0), self.centers + high + np.maximum(down, 0)
+        """Return the corners of boxes around the cells, (g, 3) each."""
+        bottom = self.corners + self.height[:, None, None] * (self._outward() - self.normals[:, None])
+        both = np.concatenate([self.corners, bottom], axis=1)
+        return self.centers + both.min(axis=1), self.centers + both.max(axis=1)
+
+    def _outward(self) -> Floats:
+        """Return how far the corners move per unit of depth, (g, k, 3), were there no sides that lean inward."""
+        after = np.minimum(self.slopes, 0.0)
+        before = np.roll(after, 1, axis=1)
+        u, v, n = np.roll(self.inward, 1, axis=1), self.inward, self.normals[:, None]
+        sine = np.einsum("gkj,gkj->gk", np.broadcast_to(n, u.shape), np.cross(u, v))[:, :, None]
+        move = before[:, :, None] * np.cross(v, n) + after[:, :, None] * np.cross(n, u)
+        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
 
 
 def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slopes: Floats, cap: float) -> list[Group]:
