@@ -53,7 +53,7 @@ class FlatPolygon:
             j = (i + 1) % len(height)
             if height[i] >= 0:
                 points.append(self.points[i])
-                # An edge that leaves here, or that runs along the cut's far side, is the cut itself.
+                # What leaves at a corner on the cut gives way to the cut.
                 slopes.append(0.0 if height[i] == 0 and height[j] < 0 else slope)
             if height[i] * height[j] < 0:
                 share = height[i] / (height[i] - height[j])
