@@ -49,21 +49,17 @@ class Truth:
         poses = self.poses(q)
         surface = self._surfaces(poses)
         solid = surface.copy()
-        free = np.flatnonzero(~surface)
-        for a, b in self._pairs:
+        # A body inside another is in its box.
+        near = self._near(poses) & ~surface[:, None]
+        for p in np.flatnonzero(near.any(axis=0)):
+            rows, (a, b) = np.flatnonzero(near[:, p]), self._pairs[p]
             for outer, inner in ((a, b), (b, a)):
-                solid[free] |= self._holds(outer, inner, poses[free])
+                solid[rows] |= self._holds(outer, inner, poses[rows, outer], poses[rows, inner])
         return surface, solid
 
     def _surfaces(self, poses: np.ndarray) -> np.ndarray:
         hits = np.zeros(len(poses), dtype=bool)
-        if not len(self._pairs):
-            return hits
-        # Boxes about the bodies that stand along the axes of the world, a hair too large.
-        centre = np.einsum("nbij,bj->nbi", poses[..., :3, :3], self._centre) + poses[..., :3, 3]
-        half = np.einsum("nbij,bj->nbi", np.abs(poses[..., :3, :3]), self._half) + 1e-9 * self.scene.extent
-        a, b = self._pairs.T
-        near = np.all(np.abs(centre[:, a] - centre[:, b]) <= half[:, a] + half[:, b], axis=-1)
+        near = self._near(poses)
         moved: list[int | None] = [None] * len(self.names)
         for n, p in zip(*np.nonzero(near), strict=True):
             if hits[n]:
@@ -77,17 +73,27 @@ class Truth:
                 hits[n] = True
         return hits
 
-    def _holds(self, outer: int, inner: int, poses: np.ndarray) -> np.ndarray:
-        found = np.zeros(len(poses), dtype=bool)
+    def _near(self, poses: np.ndarray) -> np.ndarray:
+        """Return which pairs' boxes, along the axes of the world and a hair too large, overlap, (n, pairs)."""
+        centre = np.einsum("nbij,bj->nbi", poses[..., :3, :3], self._centre) + poses[..., :3, 3]
+        half = np.einsum("nbij,bj->nbi", np.abs(poses[..., :3, :3]), self._half) + 1e-9 * self.scene.extent
+        a, b = self._pairs.T
+        return np.all(np.abs(centre[:, a] - centre[:, b]) <= half[:, a] + half[:, b], axis=-1)
+
+    def _holds(self, outer: int, inner: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Return whether one body, at poses a, holds another at poses b, (n,)."""
+        found = np.zeros(len(a), dtype=bool)
         if not self._closed[outer]:
             return found
-        a, b = poses[:, outer], poses[:, inner]
         world = np.einsum("nij,cj->nci", b[:, :3, :3], self._points[inner]) + b[:, None, :3, 3]
         local = np.einsum("nji,ncj->nci", a[:, :3, :3], world - a[:, None, :3, 3])
         low, high = self._box[outer]
         for n, c in zip(*np.nonzero(np.all((local > low) & (local < high), axis=-1)), strict=True):
             found[n] = found[n] or inside(local[n, c], self._faces[outer])
         return found
+
+    def _nested(self, outer: int, inner: int, poses: np.ndarray) -> bool:
+        return bool(self._holds(outer, inner, poses[None, outer], poses[None, inner])[0])
 
     def place(self, row: np.ndarray) -> np.ndarray:
         """Put all bodies where a configuration has them; return their poses."""
@@ -129,7 +135,7 @@ class Truth:
             self.objects[a].setTransform(fcl.Transform(moved[a, :3, :3], moved[a, :3, 3]))
             hit = bool(fcl.collide(self.objects[a], self.objects[b], self._request, fcl.CollisionResult()))
             if not hit and mode != "surface":
-                hit = bool(self._holds(a, b, moved[None])[0] or self._holds(b, a, moved[None])[0])
+                hit = self._nested(a, b, moved) or self._nested(b, a, moved)
             self.objects[a].setTransform(fcl.Transform(poses[a, :3, :3], poses[a, :3, 3]))
             if not hit:
                 return True

@@ -60,7 +60,8 @@ def text(results: Sequence[Result], command: str, count: int) -> str:
             "configurations a scene, one where nothing moves or nothing can touch. Every "
             'complete scene is loaded with `collision="auto"`, whose verdicts are compared with triangles against '
             'triangles (python-fcl) and containment (crossings of a ray), and with `collision="surface"`, whose '
-            "verdicts are compared with the triangles alone; all pairs of `scene.pairs` are tested. Uniform: half of "
+            "verdicts are compared with the triangles alone; all pairs of `scene.pairs` are tested, with "
+            '`engine="mujoco"`, which is to say by convex cells. Uniform: half of '
             "them in the whole space, half with the robot's base about the obstacles. Bisected: every point that "
             f"{HALVINGS} halvings between a free and a colliding configuration visit, onto the borders of both truths.",
             "",

@@ -85,8 +85,8 @@ class Result:
     seconds: float
 
 
-def examine(case: Case, count: int, seed: int) -> Result:
-    """Compare all verdicts on one scene."""
+def examine(case: Case, count: int, seed: int, engine: str = "mujoco") -> Result:
+    """Compare all verdicts on one scene; MuJoCo's are those of the cells, the exact engine's those of triangles."""
     start = time.perf_counter()
     scenes = {mode: env2mjcf.load(case.path, collision=mode, **case.options) for mode in MODES}
     truth = Truth(scenes["auto"])
@@ -97,7 +97,7 @@ def examine(case: Case, count: int, seed: int) -> Result:
     rows, surface, solid, uniform = visited(truth, count, seed)
     tallies = {}
     for mode, expected in (("auto", solid), ("surface", surface)):
-        verdicts = scenes[mode].in_collision(rows, threads=1)
+        verdicts = scenes[mode].in_collision(rows, threads=1, engine=engine)
         tally = tallies[mode] = Tally(len(rows), int(expected.sum()))
         for i in np.flatnonzero(verdicts != expected):
             found, pair = truth.distance(rows[i]) if verdicts[i] else truth.depth(rows[i], mode)

@@ -144,21 +144,23 @@ class RobotKinematics:
         return q
 
     def levers(self, radii: Sequence[float], slide: Sequence[float]) -> Array:
-        """Bound how far any point moves for each unit of each degree of freedom, (dim,).
+        """Bound how far any point of each body moves for a unit of each degree of freedom, (dim, nbodies).
+
+        A turn moves a point by its distance from the axis, which is no longer than the way along the chain.
 
         Args:
             radii: For each body the greatest distance of a vertex from its origin.
             slide: For each degree of freedom that is a slide, the greatest absolute value it takes; others unused.
         """
-        reach = self._reaches(radii, slide)
-        levers = np.ones(self.dim)
+        arms = [self._arm(k, slide) for k in range(len(self.multibody.connections))]
+        reach = self._reaches(radii, arms)
+        levers = np.zeros((self.dim, len(radii)))
         for i, dof in enumerate(self.dofs):
             if dof.loop:
-                levers[i] = 0.0
-            elif dof.connection is None:
-                levers[i] = 1.0 if dof.kind.is_length else reach[dof.body]
-            elif not dof.kind.is_length:
-                levers[i] = self._arm(dof.connection, slide) + reach[dof.body]
+                continue
+            moved = np.isfinite(reach[dof.body])
+            arm = 0.0 if dof.connection is None else arms[dof.connection]
+            levers[i, moved] = 1.0 if dof.kind.is_length else arm + reach[dof.body][moved]
         return levers
 
     def _home_value(self, dof: Dof) -> float:
@@ -198,14 +200,20 @@ class RobotKinematics:
         d = abs(connection.dh.d) if column is None else slide[column]
         return abs(connection.dh.a) + d + _norm(connection.to_body)
 
-    def _reaches(self, radii: Sequence[float], slide: Sequence[float]) -> list[float]:
-        reach = list(radii)
+    def _reaches(self, radii: Sequence[float], arms: Sequence[float]) -> Array:
+        """Bound the distance of the points of a body from the origin of another, (nbodies, nbodies).
+
+        Rows: the body whose origin it is; columns: the bodies that it carries; -inf for others.
+        """
+        reach = np.full((len(radii), len(radii)), -np.inf)
         for body in reversed(self.tree.order):
+            reach[body, body] = radii[body]
             k = self.tree.parent[body]
             if k is not None:
                 connection = self.multibody.connections[k]
-                way = _norm(connection.to_dh) + self._arm(k, slide) + reach[body]
-                reach[connection.previous] = max(reach[connection.previous], way)
+                way = _norm(connection.to_dh) + arms[k]
+                # Each body is reached in one way, so that a maximum only replaces what is not there.
+                reach[connection.previous] = np.maximum(reach[connection.previous], way + reach[body])
         return reach
 
 

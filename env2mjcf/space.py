@@ -204,8 +204,14 @@ class ConfigurationSpace:
     def broken(self, q: ArrayLike) -> NDArray[np.bool_]:
         """Return which degrees of freedom are beyond their limits, (..., dim); see `within_limits`."""
         values = self._last_axis(q, "q")
+        lower, upper = self.joint_limits
+        return (values < lower) | (values > upper)
+
+    @property
+    def joint_limits(self) -> tuple[Array, Array]:
+        """The limits that `within_limits` asks for, (dim,) each: infinite for periodic angles and bases' positions."""
         free = self.periodic | (self._axis >= 0)
-        return ~free & ((values < self.lower) | (values > self.upper))
+        return np.where(free, -np.inf, self.lower), np.where(free, np.inf, self.upper)
 
     def _bound_bases(self, boundary: Boundary | None) -> None:
         """A base stays within the boundary, as its vertices do."""

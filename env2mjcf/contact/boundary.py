@@ -11,8 +11,8 @@ from ..geometry.assembly import Part
 from ..model import Boundary
 from ..transforms import Array
 
-# Rounding of a vertex that lies exactly on the boundary, as a fraction of the boundary's size.
-_ROUNDING = 1e-12
+ROUNDING = 1e-12
+"""Of a vertex that lies exactly on the boundary, as a fraction of the boundary's size."""
 
 
 class BoundaryTest:
@@ -43,9 +43,9 @@ class BoundaryTest:
         if boundary.lower:
             axes = len(boundary.lower)
             lower, upper = np.array(boundary.lower), np.array(boundary.upper)
-            slack = _ROUNDING * float(np.max(np.abs([lower, upper])))
+            slack = ROUNDING * float(np.max(np.abs([lower, upper])))
             low, high = world[..., :axes].min(axis=1), world[..., :axes].max(axis=1)
             return np.all((low >= lower - slack) & (high <= upper + slack), axis=-1)
         axes = len(boundary.center)
         distance = np.linalg.norm(world[..., :axes] - boundary.center, axis=-1).max(axis=1)
-        return distance <= boundary.radius * (1 + _ROUNDING)
+        return distance <= boundary.radius * (1 + ROUNDING)

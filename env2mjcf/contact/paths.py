@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.assembly import Assembly
 from ..space import ConfigurationSpace
 from ..transforms import Array
+from .motion import MotionBounds
 from .types import Contact, PathReport
 
 # Without a resolution in the file, a step is this fraction of the extent.
@@ -27,6 +28,7 @@ class EdgeSteps:
     def __init__(self, assembly: Assembly, space: ConfigurationSpace) -> None:
         self._assembly = assembly
         self._space = space
+        self._motion = MotionBounds(assembly, space)
 
     def resolution(self, resolution: float | None) -> float:
         """Return the step in metres: what was asked for, else the file's PositionRes, else 0.01 extent.
@@ -41,21 +43,16 @@ class EdgeSteps:
             raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
         return resolution
 
-    def motion(self, q0: Array, q1: Array) -> float:
-        """Bound how far any point of any robot moves on the straight way from q0 to q1, in metres."""
-        delta = np.abs(self._space.difference(q0, q1))
-        slide = np.maximum(np.abs(q0), np.abs(q1))
-        moved = [0.0]
-        for robot, columns in zip(self._assembly.robots, self._space.robot_slices, strict=True):
-            levers = robot.kinematics.levers([p.radius for p in robot.links], list(slide[columns]))
-            moved.append(float(levers @ delta[columns]))
-        return max(moved)
+    def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
+        """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""
+        moved = self._motion.links(start, delta).max(axis=1, initial=0.0)
+        return np.maximum(2, np.ceil(moved / self.resolution(resolution)).astype(np.int64) + 1)
 
     def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:
         """Return the configurations to be checked on an edge, both ends included, (n, dim)."""
-        start, end = self._space.check(q0), self._space.check(q1)
-        steps = int(np.ceil(self.motion(start, end) / self.resolution(resolution)))
-        return self._space.interpolate(start, end, max(2, steps + 1))
+        start, delta = self._space.check(q0), self._space.difference(q0, q1)
+        count = int(self.counts(start[None], delta[None], resolution)[0])
+        return start + np.linspace(0.0, 1.0, count)[:, None] * delta
 
 
 def check_path(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
-from ..options import Collision
+from ..options import Collision, Engine
 from ..pipeline import Compiled
 from ..transforms import Array
 from .advancement import certified
@@ -18,7 +19,9 @@ from .boundary import BoundaryTest
 from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
+from .exact.engine import ExactEngine, available
 from .manifold import Manifolds, Touch
+from .motion import MotionBounds
 from .static_pairs import static_contacts
 from .surfaces import Surfaces
 from .types import Contact
@@ -49,8 +52,13 @@ class ContactQueries:
         self._containment = Containment(self._pairs, self._parts)
         self._collision: Collision = compiled.options.collision
         self._scratch = threading.local()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._of_triangles: _Triangles | None = None
+        self._default: Engine = compiled.options.engine
+        self._exact: ExactEngine | None = None
+        self._moving = tuple(p for p in self._pairs if not p.constant)
+        between_links = [p for p in self._moving if p.kind != "obstacle"]
+        self._motion = MotionBounds(assembly, self._space, between_links)
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         self._static = static_contacts(model, data, self._pairs, document.owners)
@@ -59,50 +67,104 @@ class ContactQueries:
         """Return the world poses of all links, (n, nlinks, 4, 4)."""
         return self._engine.body_poses(self._space.qpos(rows), self._bodies, self._thread_data())
 
-    def collisions(self, rows: Array) -> NDArray[np.bool_]:
+    def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether any tested pair touches, (n,)."""
+        exact = self._chosen(engine)
         if self._static:
             return np.ones(len(rows), dtype=bool)
+        return self._hits(rows) if exact is None else exact.collisions(rows)
+
+    def validities(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
+        """Return whether rows are within limits, inside the boundary and free, (n,)."""
+        exact = self._chosen(engine)
+        if self._static:
+            return np.zeros(len(rows), dtype=bool)
+        if exact is not None:
+            return exact.validities(rows)
+        valid = self._space.within_limits(rows)
+        if valid.any():
+            valid[valid] = self._boundary.inside(self.link_poses(rows[valid]))
+        if valid.any():
+            valid[valid] = ~self._hits(rows[valid])
+        return valid
+
+    def clearances(self, rows: Array) -> Array:
+        """Return the least signed distance over the tested pairs, (n,); inf without pairs."""
+        exact = self._chosen(None)
+        if exact is None:
+            return self._triangles.clearance.signed(self._poses_by_name(rows), len(rows))
+        out = np.minimum(exact.distances(rows), self._constant_clearance)
+        touching = out <= 0
+        if touching.any():
+            out[touching] = self._triangles.clearance.signed(self._poses_by_name(rows[touching]), int(touching.sum()))
+        return out
+
+    def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether anything touches at one of so many even steps, (e,), of ways from (e, dim) by (e, dim)."""
+        exact = self._chosen(None)
+        if self._static:
+            return np.ones(len(start), dtype=bool)
+        if exact is not None:
+            return exact.edges_collide(start, delta, steps)
+        ways = zip(start, delta, steps, strict=True)
+        return np.array([self._hits(a + np.linspace(0, 1, n)[:, None] * d).any() for a, d, n in ways], dtype=bool)
+
+    def edges_are_free(self, start: Array, delta: Array) -> NDArray[np.bool_]:
+        """Return whether the ways from (e, dim) by (e, dim) are provably free, (e,)."""
+        # Constant pairs are decided by themselves: a small distance of theirs must not shorten the steps.
+        if self._static or self._constant_clearance <= 0:
+            return np.zeros(len(start), dtype=bool)
+        links, pairs = self._motion.links(start, delta), self._motion.pairs(start, delta)
+        band = _BAND * self._assembly.extent
+        exact = self._chosen(None)
+        if exact is not None:
+            return exact.edges_are_free(start, delta, links, pairs, band)
+        motion = np.concatenate([links, pairs], axis=1).max(axis=1, initial=0.0)
+        ways = zip(start, delta, motion, strict=True)
+        return np.array([certified(self._moving_clearances, a, d, m, band) for a, d, m in ways], dtype=bool)
+
+    def warm_up(self) -> None:
+        """Make ready, and compile, what verdicts need."""
+        exact = self._chosen(None)
+        if exact is not None:
+            exact.warm_up()
+
+    def _hits(self, rows: Array) -> NDArray[np.bool_]:
+        """Return what MuJoCo's collision detection says, and containment, (n,)."""
         hits = self._engine.collide(self._space.qpos(rows), self._thread_data())
         free = ~hits
         if self._containment.needed and free.any():
             hits[free] = self._containment.inside(self._poses_by_name(rows[free]))
         return hits
 
-    def validities(self, rows: Array) -> NDArray[np.bool_]:
-        """Return whether rows are within limits, inside the boundary and free, (n,)."""
-        valid = self._space.within_limits(rows)
-        if valid.any():
-            valid[valid] = self._boundary.inside(self.link_poses(rows[valid]))
-        if valid.any():
-            valid[valid] = ~self.collisions(rows[valid])
-        return valid
-
-    def clearances(self, rows: Array) -> Array:
-        """Return the least signed distance over the tested pairs, (n,); inf without pairs."""
-        return self._triangles.clearance.signed(self._poses_by_name(rows), len(rows))
-
-    def certify(self, start: Array, delta: Array, motion: float) -> bool:
-        """Return whether the way from `start` by `delta` is provably free.
-
-        Args:
-            start: (dim,).
-            delta: (dim,).
-            motion: Bound of how far any point of a robot moves on that way.
-        """
-        # Constant pairs are decided by themselves: a small distance of theirs must not shorten the steps.
-        constant = self._triangles.constant.signed(self._poses_by_name(start[None]), 1)
-        if self._static or constant[0] <= 0:
-            return False
-        # Two links come nearer by what both of them move.
-        movers = 2 if any(p.kind != "obstacle" for p in self._pairs) else 1
-        return certified(self._moving_clearances, start, delta, movers * motion, _BAND * self._assembly.extent)
-
     def _moving_clearances(self, rows: Array) -> Array:
         return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
 
-    def contacts(self, row: Array) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
+    @cached_property
+    def _constant_clearance(self) -> float:
+        """Distance of the pairs that cannot move against each other."""
+        return float(self._triangles.constant.signed(self._poses_by_name(self._space.home[None]), 1)[0])
+
+    def _chosen(self, engine: Engine | None) -> ExactEngine | None:
+        """Return the exact engine if it is chosen: `auto` takes it where it can be compiled.
+
+        Raises:
+            ValueError: It is asked for by name, and numba is not installed.
+        """
+        engine = engine or self._default
+        if engine == "mujoco" or (engine == "auto" and not available()):
+            return None
+        if self._exact is None:
+            with self._lock:
+                if self._exact is None:
+                    self._exact = ExactEngine(self._assembly, self._space, self._moving, self._surfaces)
+        return self._exact
+
+    def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches; none if none does."""
+        exact = self._chosen(engine)
+        if exact is not None and not self.collisions(row[None], engine)[0]:
+            return []
         found: dict[int, list[Touch]] = {}
         for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
             index = self._pair_of[frozenset((a, b))]
@@ -113,11 +175,14 @@ class ContactQueries:
         for contact in self._static:
             index = self._pair_of[frozenset((contact.link, contact.other))]
             found.setdefault(index, []).append(Touch(contact.position, contact.normal, contact.distance))
-        if not found and not self._containment.needed:
+        if not found and exact is None and not self._containment.needed:
             return []
         poses = self._poses_by_name(row[None])
-        contained = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
-        return self._triangles.manifolds.contacts(found, contained, poses)
+        others = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
+        if not found and not others and exact is not None:
+            # Within the band of contact, cells may part what triangles say touches.
+            others = self._triangles.clearance.nearest_pairs(poses)
+        return self._triangles.manifolds.contacts(found, others, poses)
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)
@@ -132,12 +197,16 @@ class ContactQueries:
             by_name[part.name] = np.broadcast_to(part.pose, (len(rows), 4, 4))
         return by_name
 
+    @cached_property
+    def _surfaces(self) -> Surfaces:
+        return Surfaces(self._parts, self._collision)
+
     @property
     def _triangles(self) -> _Triangles:
         # Built when it is first asked for: verdicts do without it.
         with self._lock:
             if self._of_triangles is None:
-                surfaces = Surfaces(self._parts, self._collision)
+                surfaces = self._surfaces
                 clearance = Clearance(self._pairs, surfaces, self._assembly.extent)
                 moving, constant = (
                     Clearance(tuple(p for p in self._pairs if p.constant is c), surfaces, self._assembly.extent)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.assembly import Part
+from ..geometry.convexity import Box
 from ..geometry.hull import hull_triangles
 from ..geometry.orientation import winding_numbers
 from ..geometry.topology import Bools, Floats, Ints
@@ -25,6 +26,7 @@ class Surface:
         solid: Whether a body inside it counts as touching.
         outward: Whether it is solid and its normals are known to point outwards.
         convex: Whether it is the boundary of its hull.
+        box: The box that it is, if it is one.
         points: (c, 3) one corner of each component.
         corners: (v, 3) all corners, once each.
         edges: (e, 3) unit directions of the edges, each once.
@@ -35,6 +37,7 @@ class Surface:
     solid: bool
     outward: bool
     convex: bool
+    box: Box | None
     points: Floats
     corners: Floats
     edges: Floats
@@ -107,14 +110,15 @@ def _surface(part: Part, collision: Collision) -> Surface:
     if collision in ("hull", "coacd") and not analysis.convex:
         # What collides is not the mesh but these hulls.
         hulls = [hull_triangles(p.vertices + p.center) for p in shape.pieces]
-        return _made(np.concatenate(hulls), True, True, len(hulls) == 1, np.array([h[0, 0] for h in hulls]))
+        return _made(np.concatenate(hulls), True, True, len(hulls) == 1, None, np.array([h[0, 0] for h in hulls]))
     triangles = analysis.vertices[analysis.faces]
     first = np.unique(analysis.component, return_index=True)[1]
     inside = collision != "surface"
-    return _made(triangles, analysis.closed and inside, analysis.solid and inside, analysis.convex, triangles[first, 0])
+    solid, outward = analysis.closed and inside, analysis.solid and inside
+    return _made(triangles, solid, outward, analysis.convex, analysis.box, triangles[first, 0])
 
 
-def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, points: Floats) -> Surface:
+def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, box: Box | None, points: Floats) -> Surface:
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
     along = unit(along[(along != 0).any(axis=1)])
@@ -122,7 +126,7 @@ def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, points: F
     largest = np.argmax(np.abs(along), axis=1)
     along *= np.sign(np.take_along_axis(along, largest[:, None], axis=1))
     edges = along[np.unique(np.round(along, 9), axis=0, return_index=True)[1]]
-    return Surface(triangles, solid, outward, convex, points, corners, edges, unit_normals(triangles))
+    return Surface(triangles, solid, outward, convex, box, points, corners, edges, unit_normals(triangles))
 
 
 def unit_normals(triangles: Floats) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -174,6 +175,21 @@ class Scene:
 
     # Verdicts.
 
+    def warm_up(self, *, wait: bool = True) -> float:
+        """Make ready what the first query would have to wait for; return the seconds that it took.
+
+        The exact engine is compiled at its first use, and kept on disk for later ones.
+
+        Args:
+            wait: False works in a thread of its own, and returns 0.0 at once.
+        """
+        if not wait:
+            threading.Thread(target=self._queries.warm_up, name="env2mjcf-warm-up", daemon=True).start()
+            return 0.0
+        start = time.perf_counter()
+        self._queries.warm_up()
+        return time.perf_counter() - start
+
     def in_collision(
         self,
         q: ArrayLike,
@@ -200,7 +216,11 @@ class Scene:
             NotImplementedError: The engine or the executor is not available yet.
         """
         _only_available(engine or "auto", executor)
-        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._queries.collisions, threads, progress))
+
+        def answer(rows: Array) -> NDArray[np.bool_]:
+            return in_chunks(rows, lambda some: self._queries.collisions(some, engine), threads, progress)
+
+        return self._scalar_or_rows(q, answer)
 
     def is_valid(
         self,
@@ -216,14 +236,19 @@ class Scene:
         Arguments, result and errors are those of `in_collision`.
         """
         _only_available(engine or "auto", executor)
-        return self._scalar_or_rows(q, lambda rows: in_chunks(rows, self._queries.validities, threads, progress))
 
-    def contacts(self, q: ArrayLike) -> list[Contact]:
+        def answer(rows: Array) -> NDArray[np.bool_]:
+            return in_chunks(rows, lambda some: self._queries.validities(some, engine), threads, progress)
+
+        return self._scalar_or_rows(q, answer)
+
+    def contacts(self, q: ArrayLike, *, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
 
-        Pairs that cannot move are included.
+        There are some just where `in_collision` says so. Pairs that cannot move are included. Places, normals and
+        depths come from MuJoCo and from triangles, whichever engine says that there are any.
         """
-        return self._queries.contacts(self._row(q))
+        return self._queries.contacts(self._row(q), engine)
 
     def clearance(
         self,
@@ -279,11 +304,10 @@ class Scene:
         Raises:
             ValueError: q0 and q1 differ in shape, or the resolution is not positive.
         """
-        start, end = self._ends(q0, q1)
-        if start.ndim == 1:
-            return bool(self._queries.collisions(self._steps.rows(start, end, resolution)).any())
-        edges = (self._steps.rows(a, b, resolution) for a, b in zip(start, end, strict=True))
-        return np.array([self._queries.collisions(rows).any() for rows in edges], dtype=bool)
+        start, delta = self._way(q0, q1)
+        steps = self._steps.counts(np.atleast_2d(start), np.atleast_2d(delta), resolution)
+        hits = self._queries.edges_collide(np.atleast_2d(start), np.atleast_2d(delta), steps)
+        return hits if start.ndim == 2 else bool(hits[0])
 
     def edge_is_free(self, q0: ArrayLike, q1: ArrayLike) -> Any:
         """Return whether nothing touches anywhere on the straight way between two configurations, proved.
@@ -299,10 +323,9 @@ class Scene:
         Raises:
             ValueError: q0 and q1 differ in shape.
         """
-        start, end = self._ends(q0, q1)
-        if start.ndim == 1:
-            return self._queries.certify(start, self.space.difference(start, end), self._steps.motion(start, end))
-        return np.array([self.edge_is_free(a, b) for a, b in zip(start, end, strict=True)], dtype=bool)
+        start, delta = self._way(q0, q1)
+        free = self._queries.edges_are_free(np.atleast_2d(start), np.atleast_2d(delta))
+        return free if start.ndim == 2 else bool(free[0])
 
     def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
         """Check the validity of a path's configurations and of the straight edges between them.
@@ -341,11 +364,12 @@ class Scene:
             raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
         return row
 
-    def _ends(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
+    def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
+        """Return where ways begin, and where they lead from there."""
         start, end = self.space.check(q0), self.space.check(q1)
         if start.shape != end.shape:
             raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
-        return start, end
+        return start, self.space.difference(start, end)
 
     def _scalar_or_rows(self, q: ArrayLike, answer: Callable[[Array], NDArray[Any]]) -> Any:
         rows = self.space.check(q)
@@ -363,7 +387,5 @@ class Scene:
 def _only_available(engine: str, executor: Executor | None) -> None:
     if engine not in get_args(Engine):
         raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, get_args(Engine)))}")
-    if engine == "exact":
-        raise NotImplementedError("engine='exact' is not available yet; use engine='mujoco'")
     if executor is not None:
         raise NotImplementedError("executor=... is not available yet; use threads=...")

@@ -1,0 +1,1 @@
+"""The compiled part of the exact engine; importing it needs numba."""

@@ -1,0 +1,58 @@
+"""How functions are compiled: without Python's lock, and with multiplications fused to additions."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Some of its options are not in its type hints.
+_njit: Any = numba.njit
+
+# Nothing here is NaN or infinite (boxes of unused lanes are far away instead), and no sum is put in another order.
+_RELAXED = {"nnan", "nsz", "contract"}
+
+
+def compiled(function: F) -> F:
+    """Compile a function that other compiled functions call.
+
+    It may not make or return arrays: those that it is given, and its views of them, are not counted, because counting
+    them would take longer than what is done with them.
+    """
+    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False)(function))
+
+
+def compiled_strictly(function: F) -> F:
+    """Compile a function whose results must not depend on where it is used: each operation is rounded by itself."""
+    return cast(F, _njit(nogil=True, error_model="numpy", _nrt=False)(function))
+
+
+def compiled_with_arrays(function: F) -> F:
+    """Compile a function that makes or returns arrays."""
+    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy")(function))
+
+
+def _digest() -> int:
+    """Return a number that changes with the source of any compiled function."""
+    folder = Path(__file__).parent
+    sources = sorted([*folder.glob("*.py"), folder.parent / "tables.py", folder.parent / "motions.py"])
+    digest = hashlib.sha256(b"".join(p.read_bytes() for p in sources)).digest()
+    return int.from_bytes(digest[:7], "big")
+
+
+SOURCES = _digest()
+"""What entries refer to, so that none is taken from the disk that was compiled of other sources.
+
+Numba looks at the file of the entry alone, not at those of the functions that it calls; but variables of an enclosing
+function are part of what it looks an entry up by.
+"""
+
+
+def entry(function: F) -> F:
+    """Compile a function that Python calls, and keep it on disk."""
+    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", cache=True)(function))
