@@ -42,7 +42,7 @@ class TestVerdicts:
             assert not truth.wrong(row, bool(verdict), 1e-9 * model.extent)
 
     def test_are_those_of_mujoco_outside_the_band(self, model: env2mjcf.Scene) -> None:
-        q = rows(model, 1000, 3)
+        q = rows(model, 300, 3)
         exact, mujoco = (model.in_collision(q, engine=e) for e in ("exact", "mujoco"))
         differ = q[exact != mujoco]
         assert len(differ) < 20
@@ -50,7 +50,7 @@ class TestVerdicts:
         assert 0.02 < exact.mean() < 0.98
 
     def test_of_validity_are_those_of_mujoco_too(self, model: env2mjcf.Scene) -> None:
-        q = rows(model, 500, 4)
+        q = rows(model, 200, 4)
         # Some rows beyond limits, some beyond the boundary.
         q = np.concatenate([q, 1.3 * q])
         exact, mujoco = (model.is_valid(q, engine=e) for e in ("exact", "mujoco"))
@@ -119,11 +119,15 @@ class TestClearance:
 
     def test_is_positive_just_where_nothing_touches(self, model: env2mjcf.Scene) -> None:
         q = rows(model, 300, 8)
-        np.testing.assert_array_equal(model.clearance(q) > 0, ~model.in_collision(q))
+        hits = model.in_collision(q)
+        assert (model.clearance(q[~hits]) > 0).all()
+        # Depths are searched for in numpy, which takes its time.
+        assert (model.clearance(q[hits][:6]) <= 0).all()
 
     def test_is_that_of_the_arrays(self, model: env2mjcf.Scene) -> None:
         """The numpy search, which answers where numba is not installed."""
         q = rows(model, 60, 9)
+        q = q[~model.in_collision(q)][:10]
         arrays = model._queries._triangles.clearance.signed(model._queries._poses_by_name(q), len(q))
         np.testing.assert_allclose(model.clearance(q), arrays, atol=1e-9 * model.extent)
 
@@ -150,15 +154,20 @@ class TestEdges:
 
     def test_that_are_clear_by_more_than_the_band_are_certified(self, model: env2mjcf.Scene) -> None:
         q0 = rows(model, 100, 13)
+        q0 = q0[~model.in_collision(q0)]
         q0 = q0[model.clearance(q0) > 1e-3 * model.extent][:40]
         delta = 0.05 * model.space.difference(q0, np.roll(q0, 1, axis=0))
+        proved = 0
         for a, d in zip(q0, delta, strict=True):
-            least = model.clearance(a + np.linspace(0, 1, 200)[:, None] * d).min()
-            if least > 5e-4 * model.extent:
+            between = a + np.linspace(0, 1, 100)[:, None] * d
+            if not model.in_collision(between).any() and model.clearance(between).min() > 5e-4 * model.extent:
                 assert model.edge_is_free(a, a + d)
+                proved += 1
+        assert proved > 5
 
     def test_are_certified_as_the_arrays_say(self, model: env2mjcf.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
         q0 = rows(model, 12, 14)
+        q0 = q0[~model.in_collision(q0)][:8]
         q1 = q0 + 0.1 * model.space.difference(q0, np.roll(q0, 1, axis=0))
         compiled = model.edge_is_free(q0, q1)
         monkeypatch.setattr(model._queries, "_default", "mujoco")
