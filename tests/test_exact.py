@@ -212,6 +212,12 @@ class TestEngines:
         assert scene.warm_up() < 0.1
         assert load("maze/maze").warm_up(wait=False) == 0.0
 
+    def test_the_command_line_compiles_ahead(self, capsys: pytest.CaptureFixture[str]) -> None:
+        from env2mjcf.cli.main import main
+
+        assert main(["cache", "warm"]) == 0
+        assert capsys.readouterr().out.startswith("the exact engine is ready")
+
     def test_what_is_kept_on_disk_belongs_to_these_sources(self) -> None:
         from env2mjcf.contact.exact.kernels import compiling, entries
 

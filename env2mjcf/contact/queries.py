@@ -19,7 +19,7 @@ from .boundary import BoundaryTest
 from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
-from .exact.engine import ExactEngine, available
+from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
 from .motion import MotionBounds
 from .static_pairs import static_contacts
@@ -125,9 +125,8 @@ class ContactQueries:
 
     def warm_up(self) -> None:
         """Make ready, and compile, what verdicts need."""
-        exact = self._chosen(None)
-        if exact is not None:
-            exact.warm_up()
+        if self._chosen(None) is not None:
+            compile_all()
 
     def _hits(self, rows: Array) -> NDArray[np.bool_]:
         """Return what MuJoCo's collision detection says, and containment, (n,)."""
