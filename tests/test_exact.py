@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from meshes import channel
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from truth import Truth, bisected, near_obstacles
 
 import env2mjcf
 import env2mjcf.contact.exact.engine as exact_engine
+from env2mjcf.formats.byu import export_byu
 
 pytest.importorskip("numba")
 
@@ -69,6 +72,25 @@ class TestVerdicts:
     def test_go_with_contacts(self, model: env2mjcf.Scene) -> None:
         for row in bisected(model, Truth(model), 20, 45, seed=6):
             assert bool(model.contacts(row)) == model.in_collision(row)
+
+    @pytest.mark.parametrize("engine", ["exact", "mujoco"])
+    def test_of_a_base_walled_in_are_always_collisions(self, tmp_path: Path, engine: str) -> None:
+        """It cannot move, and no surface touches it: the floor of a channel is around it."""
+        mesh = channel()
+        middle = mesh.vertices.mean(axis=0)
+        solid = export_byu(trimesh.Trimesh(mesh.vertices - middle, mesh.faces, process=False))
+        within, above = np.array([2, 1.5, 0.5]) - middle, np.array([2, 1.5, 2.5]) - middle
+        for place, expected in ((within, True), (above, False)):
+            pose = " ".join(map(str, place))
+            robot = f"1\ncube.g Fixed {pose} 0 0 0\nConnections\n0\n"
+            scene = env2mjcf.load(
+                write_scene(
+                    tmp_path, free_cube("solid.g 0 0 0 0 0 0", robot=robot), cube=box_mesh(0.1, 0.1, 0.1), solid=solid
+                )
+            )
+            q = np.zeros((2, 0))
+            assert scene.in_collision(q, engine=engine).tolist() == [expected] * 2
+            assert scene.is_valid(q, engine=engine).tolist() == [not expected] * 2
 
     def test_of_surfaces_know_no_inside(self, tmp_path: Path) -> None:
         path = write_scene(

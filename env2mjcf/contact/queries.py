@@ -70,14 +70,14 @@ class ContactQueries:
     def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether any tested pair touches, (n,)."""
         exact = self._chosen(engine)
-        if self._static:
+        if self._always:
             return np.ones(len(rows), dtype=bool)
         return self._hits(rows) if exact is None else exact.collisions(rows)
 
     def validities(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether rows are within limits, inside the boundary and free, (n,)."""
         exact = self._chosen(engine)
-        if self._static:
+        if self._always:
             return np.zeros(len(rows), dtype=bool)
         if exact is not None:
             return exact.validities(rows)
@@ -102,7 +102,7 @@ class ContactQueries:
     def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return whether anything touches at one of so many even steps, (e,), of ways from (e, dim) by (e, dim)."""
         exact = self._chosen(None)
-        if self._static:
+        if self._always:
             return np.ones(len(start), dtype=bool)
         if exact is not None:
             return exact.edges_collide(start, delta, steps)
@@ -112,7 +112,7 @@ class ContactQueries:
     def edges_are_free(self, start: Array, delta: Array) -> NDArray[np.bool_]:
         """Return whether the ways from (e, dim) by (e, dim) are provably free, (e,)."""
         # Constant pairs are decided by themselves: a small distance of theirs must not shorten the steps.
-        if self._static or self._constant_clearance <= 0:
+        if self._always or self._constant_clearance <= 0:
             return np.zeros(len(start), dtype=bool)
         links, pairs = self._motion.links(start, delta), self._motion.pairs(start, delta)
         band = _BAND * self._assembly.extent
@@ -138,6 +138,14 @@ class ContactQueries:
 
     def _moving_clearances(self, rows: Array) -> Array:
         return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
+
+    @cached_property
+    def _always(self) -> bool:
+        """Whether bodies that cannot move against each other touch, or are inside each other: always, then."""
+        if self._static or not self._containment.needed:
+            return bool(self._static)
+        inside = self._containment.pairs_inside(self._poses_by_name(self._space.home[None]))
+        return any(self._pairs[i].constant for i, _ in inside)
 
     @cached_property
     def _constant_clearance(self) -> float:

@@ -25,8 +25,8 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
     first, second = tables.shapes[s], tables.shapes[t]
     if first[_IS_BOX] == 1 and second[_IS_BOX] == 1:
         # The boxes are the bodies.
-        return (first[_IS_SOLID] == 1 or not _box_in_box(m, a, b)) and (
-            second[_IS_SOLID] == 1 or not _box_in_box(inverted(m), b, a)
+        return (first[_IS_SOLID] > 0 or not _box_in_box(m, a, b)) and (
+            second[_IS_SOLID] > 0 or not _box_in_box(inverted(m), b, a)
         )
     if first[_IS_BOX] == 1 and _counts_as_solid(first, a, b):
         crosses = box_crosses(tables, a, 0.0, t, m, stack)
@@ -36,15 +36,15 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
         crosses = _trees_cross(tables, s, t, m, stack)
     if crosses:
         return True
-    return (second[_IS_SOLID] == 1 and _holds_any(tables, t, s, inverted(m), stack)) or (
-        first[_IS_SOLID] == 1 and _holds_any(tables, s, t, m, stack)
+    return (second[_IS_SOLID] > 0 and _holds_any(tables, t, s, inverted(m), stack)) or (
+        first[_IS_SOLID] > 0 and _holds_any(tables, s, t, m, stack)
     )
 
 
 @compiled
 def _counts_as_solid(shape: Any, half: Any, other: Any) -> bool:
     """Return whether a triangle in a box means contact: it is solid, or no component of the other fits into it."""
-    return shape[_IS_SOLID] == 1 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
+    return shape[_IS_SOLID] > 0 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
 
 
 @compiled
