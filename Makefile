@@ -49,6 +49,8 @@ $(VENV)/view.stamp: pyproject.toml
 
 $(VENV)/dev.stamp: pyproject.toml
 	$(call install,dev)
+	@echo "compiling the exact engine, once" >&2
+	@$(BIN)/env2mjcf cache warm >&2
 	@touch $(VENV)/view.stamp $@
 
 define install

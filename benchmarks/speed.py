@@ -6,18 +6,18 @@ Writes `benchmarks/speed.md`. ENV2MJCF_CORPUS names the folder of real scenes. N
 from __future__ import annotations
 
 import argparse
-import ctypes
 import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-import fcl
-import mujoco
-import numba
 import numpy as np
+from c_loop import CLoop, with_verdict_settings
+from pages import table
+from peers import Fcl
+from rounds import no_collections, order
 from table import Case, corpus_cases
 from truth import Truth, visited
 
@@ -39,75 +39,6 @@ ROWS = 1000
 REPEATS = 3
 
 
-def c_loop() -> Callable[..., None]:
-    """Return a compiled loop over configurations that calls MuJoCo's functions by their addresses."""
-    library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
-    kinematics, collision = library.mj_kinematics, library.mj_collision
-    for function in (kinematics, collision):
-        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
-
-    @numba.njit(nogil=True)
-    def loop(model: int, data: int, qpos: np.ndarray, rows: np.ndarray) -> None:
-        for i in range(len(rows)):
-            qpos[:] = rows[i]
-            kinematics(model, data)
-            collision(model, data)
-
-    return loop
-
-
-class Fcl:
-    """What a Python user would do with python-fcl: poses known, obstacles placed once, done at the first contact."""
-
-    def __init__(self, truth: Truth, rows: np.ndarray) -> None:
-        links = len(truth.scene.link_names)
-        poses = truth.poses(rows)
-        self.transforms = [[fcl.Transform(p[:3, :3], p[:3, 3]) for p in row[:links]] for row in poses]
-        truth.place(rows[0])
-        self.links, others = truth.objects[:links], truth.objects[links:]
-        index = {n: i for i, n in enumerate(truth.names)}
-        numbers = [(index[a], index[b]) for a, b in truth.pairs]
-        self.pairs = [(truth.objects[a], truth.objects[b]) for a, b in numbers]
-        # A manager tests all links with all obstacles; the rest is tested one by one.
-        self.own = [(truth.objects[a], truth.objects[b]) for a, b in numbers if max(a, b) < links]
-        self.manager = fcl.DynamicAABBTreeCollisionManager() if others else None
-        if self.manager:
-            assert len(numbers) - len(self.own) == links * len(others), "not all links are tested with all obstacles"
-            self.manager.registerObjects(others)
-            self.manager.setup()
-
-    def pair_by_pair(self) -> np.ndarray:
-        """Ask about one pair after the other."""
-        hits = np.zeros(len(self.transforms), dtype=bool)
-        request = fcl.CollisionRequest()
-        collide, result = fcl.collide, fcl.CollisionResult
-        for i, row in enumerate(self.transforms):
-            for link, transform in zip(self.links, row, strict=True):
-                link.setTransform(transform)
-            for a, b in self.pairs:
-                if collide(a, b, request, result()):
-                    hits[i] = True
-                    break
-        return hits
-
-    def managed(self) -> np.ndarray:
-        """Ask a broadphase manager about the obstacles."""
-        hits = np.zeros(len(self.transforms), dtype=bool)
-        request, callback = fcl.CollisionRequest(), fcl.defaultCollisionCallback
-        for i, row in enumerate(self.transforms):
-            for link, transform in zip(self.links, row, strict=True):
-                link.setTransform(transform)
-            for link in self.links:
-                data = fcl.CollisionData(request=request)
-                self.manager.collide(link, data, callback)
-                if data.result.is_collision:
-                    hits[i] = True
-                    break
-            else:
-                hits[i] = any(fcl.collide(a, b, request, fcl.CollisionResult()) for a, b in self.own)
-        return hits
-
-
 def configurations(truth: Truth, count: int) -> np.ndarray:
     """Return rows of which half are uniform in the whole space, half the last steps of bisections onto contact."""
     rows, _, _, uniform = visited(truth, 40 * count // 3 + 400, seed=5)
@@ -118,47 +49,43 @@ def configurations(truth: Truth, count: int) -> np.ndarray:
     return q[rng.permutation(len(q))]
 
 
-def race(case: Case, loop: Callable[..., None], count: int, rounds: int) -> dict[str, float]:
+def race(case: Case, count: int, rounds: int) -> dict[str, float]:
     """Return medians in seconds a query, and disagreements."""
     scene = env2mjcf.load(case.path, **case.options)
     truth = Truth(scene)
     q = configurations(truth, count)
-    rival = Fcl(truth, q)
-    qpos = np.ascontiguousarray(scene.space.qpos(q))
-    # The verdicts' own model and its settings; `written` is the model as it is converted, meant for simulation.
-    engine = scene._queries._engine
-    verdict_data, written_data = engine.data(), mujoco.MjData(scene.model)
+    everything = slice(0, len(q))
+    rivals = Fcl(truth, q).ways()
+    qpos = scene.space.qpos(q)
+    # With the settings of verdicts; `written` is the model as it is converted, meant for simulation.
+    cells = CLoop(with_verdict_settings(scene.model), qpos)
     runs = {
-        "c": lambda: loop(engine._model._address, verdict_data._address, verdict_data.qpos, qpos),
-        "written": lambda: loop(scene.model._address, written_data._address, written_data.qpos, qpos),
-        "scene": lambda: scene.in_collision(q, threads=1),
-        "fcl pairs": rival.pair_by_pair,
+        "c": cells,
+        "written": CLoop(scene.model, qpos),
+        "scene": lambda part: scene.in_collision(q[part], threads=1),
+        **rivals,
     }
-    if rival.manager:
-        runs["fcl manager"] = rival.managed
     times: dict[str, list[float]] = {name: [] for name in runs}
     for run in runs.values():
-        run()
-    for number in range(rounds):
-        # Each round begins with another one.
-        order = list(runs)[number % len(runs) :] + list(runs)[: number % len(runs)]
-        for name in order:
-            start = time.thread_time()
-            runs[name]()
-            times[name].append((time.thread_time() - start) / len(q))
+        run(everything)
+    with no_collections():
+        for number in range(rounds):
+            for name in order(list(runs), number):
+                start = time.thread_time()
+                runs[name](everything)
+                times[name].append((time.thread_time() - start) / len(q))
     out = {name: float(np.median(t)) for name, t in times.items()}
-    best = "fcl manager" if out.get("fcl manager", np.inf) < out["fcl pairs"] else "fcl pairs"
+    best = min(rivals, key=out.__getitem__)
     # A ratio of one round is of one moment of the machine.
     for name in ("c", "written", "scene"):
         out[f"{name} ratio"] = float(np.median(np.divide(times[name], times[best])))
-    cells, (surface, solid) = engine.collide(qpos, verdict_data), truth.verdicts(q)
+    hits, (surface, solid) = cells.verdicts(everything), truth.verdicts(q)
     out["hits"] = float(surface.mean())
-    for name in ("fcl pairs", "fcl manager"):
-        if name in runs:
-            assert np.array_equal(runs[name](), surface), f"{case.name}: {name} is not what the triangles say"
+    for name, way in rivals.items():
+        assert np.array_equal(way(everything), surface), f"{case.name}: {name} is not what the triangles say"
     out["nested"] = int((solid & ~surface).sum())
-    out["c differs"] = int((cells != surface).sum())
-    out["c differs, not nested"] = int((cells != surface)[surface == solid].sum())
+    out["c differs"] = int((hits != surface).sum())
+    out["c differs, not nested"] = int((hits != surface)[surface == solid].sum())
     out["scene differs"] = int((scene.in_collision(q) != solid).sum())
     return out
 
@@ -183,12 +110,6 @@ def conversions(case: Case, runs: int) -> tuple[float, ...] | None:
                 spent.append(time.process_time() - cpu)
             seconds.append(elapsed + spent)
     return tuple(np.min(seconds, axis=0).tolist())
-
-
-def lines(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return a Markdown table."""
-    cells = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return ["| " + " | ".join(c.replace("_", "\\_") for c in row) + " |" for row in cells]
 
 
 def text(races: dict[str, dict[str, float]], times: dict[str, tuple[float, ...]], count: int, rounds: int) -> str:
@@ -244,7 +165,7 @@ def text(races: dict[str, dict[str, float]], times: dict[str, tuple[float, ...]]
             "inside the band of truth.md or not.",
             "- as written: the C loop on the converted model with its settings for simulation.",
             "",
-            *lines(header, rows),
+            *table(header, rows),
             "",
             "## Conversions",
             "",
@@ -252,7 +173,7 @@ def text(races: dict[str, dict[str, float]], times: dict[str, tuple[float, ...]]
             f"{len(times)} scenes convert. The slowest cold is {cold[0]} with {cold[1][0]:.2f} s (mark: 10 s), the "
             f"slowest warm is {warm[0]} with {warm[1][1]:.2f} s (mark: 1 s).",
             "",
-            *lines(
+            *table(
                 ("scene", "cold, s", "warm, s", "cold, CPU s", "warm, CPU s"),
                 [(name, *(f"{t:.3f}" for t in found)) for name, found in times.items()],
             ),
@@ -277,10 +198,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, case in cases.items():
         if (seconds := conversions(case, 1 if chosen.quick else REPEATS)) is not None:
             times[name] = seconds
-    loop = c_loop()
     races = {}
     for name in SCENES:
-        races[name] = race(cases[name], loop, count, rounds)
+        races[name] = race(cases[name], count, rounds)
         print(name, {k: float(f"{v:.3g}") for k, v in races[name].items()}, flush=True)
     page = text(races, times, count, rounds)
     if chosen.quick:

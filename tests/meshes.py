@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from env2mjcf.errors import DiagnosticLog, GeometryError
@@ -90,3 +92,41 @@ def corpus_meshes(corpus: Path) -> list[Mesh]:
             continue
         found.setdefault(mesh.digest, mesh)
     return list(found.values())
+
+
+def voxels(planes: list[np.ndarray], filled: np.ndarray) -> trimesh.Trimesh:
+    """Return the boundary of the filled cells of a grid, with the mean of its vertices at the origin."""
+    solid = np.pad(filled, 1)
+    corners, faces = [], []
+    for cell in np.argwhere(filled):
+        for axis, side in itertools.product(range(3), (0, 1)):
+            beyond = cell + 1
+            beyond[axis] += 2 * side - 1
+            if solid[tuple(beyond)]:
+                continue
+            square = []
+            for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))[:: 1 if side else -1]:
+                corner = cell.copy()
+                corner[axis] += side
+                corner[(axis + 1) % 3] += u
+                corner[(axis + 2) % 3] += v
+                square.append([p[i] for p, i in zip(planes, corner, strict=True)])
+            n = len(corners)
+            corners += square
+            faces += [[n, n + 1, n + 2], [n, n + 2, n + 3]]
+    mesh = trimesh.Trimesh(corners, faces)
+    mesh.merge_vertices()
+    mesh.vertices -= mesh.vertices.mean(axis=0)
+    return mesh
+
+
+def table(width: float, depth: float, height: float, thickness: float) -> trimesh.Trimesh:
+    """A top and four legs in one closed mesh."""
+
+    def across(side: float) -> np.ndarray:
+        return np.array([-side / 2, -side / 2 + thickness, side / 2 - thickness, side / 2])
+
+    filled = np.zeros((3, 3, 2), dtype=bool)
+    filled[:, :, 1] = True
+    filled[::2, ::2, 0] = True
+    return voxels([across(width), across(depth), np.array([0, height - thickness, height])], filled)

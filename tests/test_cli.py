@@ -420,7 +420,7 @@ class TestExitStatus:
             ("--scale", "x"),
             ("--collision", "hul"),
             ("--semantics", "page"),
-            ("--engine", "exact"),
+            ("--engine", "exakt"),
             ("--exclude-pairs", "cube", "nothing"),
             ("--exclude-pairs", "cube"),
             ("--adjacent-links", "-1"),

@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scenes import MODELS, box_mesh, free_cube, write_scene
+from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 
@@ -253,15 +253,6 @@ def test_ground_and_walls_act_in_simulation_only(tmp_path: Path) -> None:
     while walled.data.time < 3:
         mujoco.mj_step(walled.model, walled.data)
     assert walled.q()[2] == pytest.approx(-2.5, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("options", "value"),
-    [({"engine": "exact"}, "exact")],
-)
-def test_what_is_not_there_yet_says_so(options: dict[str, str], value: str) -> None:
-    with pytest.raises(NotImplementedError, match=value):
-        env2mjcf.load(MODELS / "seed/seed.env", **options)
 
 
 def test_an_executor_must_be_one(cubes: env2mjcf.Scene) -> None:

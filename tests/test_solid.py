@@ -1,4 +1,4 @@
-"""Mitred shells: where the cells of a closed non-convex mesh lie, and what they cover."""
+"""Shells: where the cells of a closed non-convex mesh lie, and what they cover."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from meshes import box, channel, corpus_meshes, joined, moved, rotation, turned
+from meshes import box, channel, corpus_meshes, joined, moved, rotation, turned, voxels
 from scenes import MODELS
 
 from env2mjcf.diagnostics import CATALOGUE
@@ -153,24 +153,45 @@ def assert_inside_and_covering(mesh: Mesh, *, pinned: int = 0) -> None:
     cells = [p for p in pieces if height(shape, p) > 1.5 * PIN * a.diagonal]
     assert len(pieces) - len(cells) <= pinned
     assert protrusion(shape, cells) <= 1e-9
-    covered = np.zeros(len(a.faces), dtype=bool)
-    area = 0.0
+    parts: dict[tuple[int, ...], list[ConvexPiece]] = {}
     for piece in pieces:
-        polygon = piece.polygon
-        corners = a.vertices[list(polygon.loop)]
-        area += (
-            np.linalg.norm(np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)) / 2
-        )
-        covered[list(polygon.faces)] = True
-        if piece in cells:
-            points = piece.vertices + piece.center
-            above = (points - corners.mean(axis=0)) @ polygon.normal
-            outer = points[above > -1e-9 * a.diagonal]
-            assert above.max() <= 1e-9 * a.diagonal
-            assert_same_outline(outer, corners, polygon.normal, 1e-9 * a.diagonal)
+        parts.setdefault(piece.polygon.faces, []).append(piece)
+    area = 0.0
+    for same in parts.values():
+        corners = a.vertices[list(same[0].polygon.loop)]
+        area += area_of(corners)
+        if all(piece in cells for piece in same):
+            assert_outer_faces_are(same, corners, 1e-9 * a.diagonal)
     assert area == pytest.approx(a.area, rel=1e-9)
     if len(pieces) == len(shape.pieces):
-        assert covered.all()
+        assert sorted(f for faces in parts for f in faces) == list(range(len(a.faces)))
+
+
+def area_of(corners: np.ndarray) -> float:
+    return float(
+        np.linalg.norm(np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)) / 2
+    )
+
+
+def assert_outer_faces_are(cells: list[ConvexPiece], corners: np.ndarray, tolerance: float) -> None:
+    """One cell has the polygon for its outer face; the outer faces of several are in it, and make up its area."""
+    normal = cells[0].polygon.normal
+    outer = []
+    for cell in cells:
+        points = cell.vertices + cell.center
+        above = (points - corners.mean(axis=0)) @ normal
+        assert above.max() <= tolerance
+        outer.append(points[above > -tolerance])
+    if len(cells) == 1:
+        assert_same_outline(outer[0], corners, normal, tolerance)
+        return
+    sides = np.cross(normal, np.roll(corners, -1, axis=0) - corners)
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    for points in outer:
+        assert (np.einsum("ej,pej->pe", sides, points[:, None] - corners) >= -tolerance).all()
+    # A slab of height one over each face has the face's area for its volume.
+    slabs = [hull_volume(np.vstack([points, points - normal]) - points[0]) for points in outer]
+    assert sum(slabs) == pytest.approx(area_of(corners), rel=1e-6)
 
 
 def assert_same_outline(found: np.ndarray, corners: np.ndarray, normal: np.ndarray, tolerance: float) -> None:
@@ -205,7 +226,7 @@ def test_a_surface_that_crosses_or_touches_itself_has_no_cell_outside(mesh: Mesh
     shape, pieces = lined(mesh)
     a = shape.analysis
     cells = [p for p in pieces if height(shape, p) > 1.5 * PIN * a.diagonal]
-    assert sum(len(p.polygon.faces) for p in pieces) == len(a.faces)
+    assert sorted(f for faces in {p.polygon.faces for p in pieces} for f in faces) == list(range(len(a.faces)))
     points = np.concatenate([p.center + 0.999 * p.vertices for p in cells])
     assert (np.abs(winding_numbers(points, a.vertices, a.faces)) > 0.5).all()
     assert_compiles(shape)
@@ -233,19 +254,44 @@ def test_the_protrusion_test_sees_a_cell_that_sticks_out() -> None:
     assert protrusion(shape, [moved_out]) > 1e-8
 
 
-def test_a_box_in_a_corner_has_mitred_cells_of_known_volume() -> None:
-    """A frustum under each side of the channel: 45 degrees at right angles, straight down at reflex edges."""
-    _, pieces = lined(channel())
-    h = 0.02 * np.sqrt(16 + 9 + 9)
-    volumes = {tuple(np.round(p.polygon.normal, 9) + 0.0): [] for p in pieces}
+def volumes_by_normal(mesh: Mesh) -> dict[tuple[float, ...], list[float]]:
+    _, pieces = lined(mesh)
+    volumes: dict[tuple[float, ...], list[float]] = {}
     for p in pieces:
-        volumes[tuple(np.round(p.polygon.normal, 9) + 0.0)].append(hull_volume(p.vertices))
-    # The outer bottom of 4 x 3 loses h on all sides.
-    assert volumes[0, 0, -1] == [
-        pytest.approx(h / 6 * (12 + 4 * (4 - h) * (3 - h) + (4 - 2 * h) * (3 - 2 * h)), rel=1e-5)
-    ]
-    # The floor of the channel loses h at its two ends only.
-    assert any(v == pytest.approx(h * (4 - h), rel=1e-5) for v in volumes[0, 0, 1])
+        volumes.setdefault(tuple(np.round(p.polygon.normal, 9) + 0.0), []).append(hull_volume(p.vertices))
+    return volumes
+
+
+def test_cells_go_straight_down_at_right_and_reflex_edges() -> None:
+    """Slabs, which overlap at the corners of the channel as its walls do."""
+    volumes = volumes_by_normal(channel())
+    h = 0.02 * np.sqrt(16 + 9 + 9)
+    assert volumes[0, 0, -1] == [pytest.approx(12 * h, rel=1e-5)]
+    assert any(v == pytest.approx(4 * h, rel=1e-5) for v in volumes[0, 0, 1])
+
+
+@pytest.mark.parametrize("width", [4, 2], ids=["acute", "obtuse"])
+def test_cells_fill_the_wedges_at_convex_edges(width: float) -> None:
+    """A trough of which the long sides lean by 45 degrees: the cell under its bottom, w wide, ends at their planes."""
+    lean = (width - 3) / 1  # the rim is 3 apart, one above the bottom
+    section = np.array([[0, 0.9], [-1.5, 1], [-width / 2, 0], [width / 2, 0], [1.5, 1]])  # y, z; seen from the first
+    n = len(section)
+    corners = np.vstack([np.column_stack([np.full(n, x), section]) for x in (0.0, 5.0)])
+    cap = np.array([[0, i, i + 1] for i in range(1, n - 1)])
+    sides = [f for i in range(n) for j in [(i + 1) % n] for f in ([i, j, j + n], [i, j + n, i + n])]
+    mesh = Mesh.from_arrays("trough", corners, np.vstack([cap[:, ::-1], cap + n, sides]))
+    h = 0.02 * mesh.diagonal
+    assert volumes_by_normal(mesh)[0, 0, -1] == [pytest.approx(5 * (width * h - lean * h**2 / 2), rel=1e-5)]
+
+
+def test_cells_go_straight_down_at_blunt_edges() -> None:
+    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab."""
+    outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.0), (0.8, 1.4), (1.0, 1.4), (1.0, 2.4)]  # radius, height
+    drum = trimesh.creation.revolve([(0, 0), *outline, (0, 2.4)], sections=24)
+    volumes = volumes_by_normal(of_trimesh("drum", drum))
+    h, side = 0.02 * np.linalg.norm(np.ptp(drum.vertices, axis=0)), 2 * np.sin(np.pi / 24)
+    sides = sorted(v for normal, found in volumes.items() if normal[2] == 0 for v in found)
+    assert sides[24:] == pytest.approx([side * h] * 48, rel=1e-4)  # the least are those in the groove
 
 
 @pytest.mark.parametrize("name", ["channel", "torus", "spiky", "star", "thin bottom"])
@@ -266,6 +312,40 @@ def test_a_thin_spot_makes_cells_thin_and_not_wrong() -> None:
     result = shelled(thin_bottom(0.01))
     assert result.pinned == 0
     assert 0.004 < result.thinnest <= 0.01
+
+
+def plate(low: tuple[float, float], across: bool, left: float) -> Mesh:
+    """A plate of 4 x 3, 0.4 thick, with a groove or a pit below it that leaves `left` of it over x in `low`."""
+    x, z = np.array([0, *low, 4]), np.array([0, 0.4 - left, 0.4])
+    y = np.array([0, 3.0]) if across else np.array([0, 1.4, 1.6, 3.0])
+    filled = np.ones((3, len(y) - 1, 2), dtype=bool)
+    filled[1, len(y) // 2 - 1, 0] = False
+    return of_trimesh("plate", voxels([x, y, z], filled))
+
+
+@pytest.mark.parametrize("across", [True, False], ids=["groove", "pit"])
+@pytest.mark.parametrize("turn", [0, 3])
+def test_a_large_face_is_thin_at_its_thin_spot_only(across: bool, turn: int) -> None:
+    mesh = moved(plate((1.9, 2.1), across, 4e-4), rotation(turn) if turn else np.eye(3))
+    assert_inside_and_covering(mesh)
+    up = rotation(turn)[:, 2] if turn else np.array([0, 0, 1.0])
+    shape, pieces = lined(mesh)
+    top = [p for p in pieces if p.polygon.normal @ up > 0.99 and area_of(mesh.vertices[list(p.polygon.loop)]) > 1]
+    thick = [p for p in top if height(shape, p) > 0.019 * shape.analysis.diagonal]
+    thin = [p for p in top if p not in thick]
+    # 3.8 of 4 units of the length are as thick as cells are anywhere; the strip over the groove is as thin as before.
+    covered = sum(hull_volume(p.vertices) / height(shape, p) for p in thick)
+    assert covered == pytest.approx(3.8 * 3, rel=1e-3)
+    assert len(thin) == 1
+    assert height(shape, thin[0]) == pytest.approx(2e-4, rel=1e-3)
+    assert shelled(mesh).split == 1
+    assert "1 polygon split at thin spots" in shape.note
+
+
+def test_a_face_that_is_thin_all_over_is_not_split() -> None:
+    result = shelled(plate((0.1, 3.9), True, 4e-4))
+    assert result.split == 0
+    assert len(result.pieces) == 14
 
 
 def test_where_there_is_no_room_a_thin_prism_stands_and_is_counted() -> None:

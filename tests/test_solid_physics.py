@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
 from real_scenes import real_scene
 from scenes import MODELS, box_mesh, free_cube, write_scene
-from simulations import simulated, start, weight
+from simulations import fall, simulated, start, weight
 from truth import Truth
 
 import env2mjcf
@@ -94,32 +95,53 @@ def test_a_hull_throws_the_box_out_of_the_bottle(tmp_path: Path) -> None:
     assert np.linalg.norm(scene.q()[:3]) > 2
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_a_box_dropped_into_the_real_bug_trap_comes_to_rest_in_it(corpus: Path, tmp_path: Path, seed: int) -> None:
+    trap = next(real_scene("bug_trap1.0.bug-trap").env.parent.rglob("trap.obj"))
+    path = write_scene(tmp_path, free_cube("trap.g 0 2 0 20 10 40"), cube=box_mesh(2.5, 2, 1.5))
+    path.write_text(path.read_text().replace("trap.g", "trap.obj"))
+    scene = env2mjcf.load(path, mesh_dirs=(trap.parent,))
+    turn = np.random.default_rng(seed).uniform(-np.pi, np.pi, 3)
+    start(scene, np.array([0, 0, 6, *turn]))
+    fall(scene, every=0.25).check()
+    assert deepest(scene) < 0.01 * np.sqrt(5**2 + 4**2 + 3**2)
+    # The trap is a bottle about 35 long; a free fall would have been of 490.
+    assert np.linalg.norm(scene.q()[:3]) < 15
+    assert scene.q()[2] < -8
+
+
 def test_a_non_convex_bug_comes_to_rest_in_the_bottle() -> None:
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
-    energy = start(scene, scene.queries[0].q[0])
-    size = 1.0914
-    depths, places = [], []
-    for t, highest in enumerate(simulated(scene, 5)):
-        assert highest <= energy + 0.01 * weight(scene) * size
-        if t * 0.25 >= 3:
-            depths.append(deepest(scene))
-            places.append(scene.q()[:3].copy())
-    assert max(depths) < 0.01 * size
-    assert np.abs(np.array(places) - places[-1]).max() < 0.01 * size
-    assert -1.49 < places[-1][2] < -1.1
+    start(scene, scene.queries[0].q[0])
+    fall(scene, every=0.25).check()
+    assert deepest(scene) < 0.01 * 1.0914
+    assert -1.49 < scene.q()[2] < -1.1
 
 
 def test_alpha_tubes_hang_in_one_another() -> None:
     scene = env2mjcf.load(MODELS / "alpha/alpha.env", query=MODELS / "alpha/alpha.query")
     energy = start(scene, scene.queries[0].q[0])
     size = 4.271
-    for t, highest in enumerate(simulated(scene, 6)):
+    for t, highest in enumerate(simulated(scene, 10)):
         assert highest <= energy + 0.01 * weight(scene) * size
         if t % 4 == 3:
             assert deepest(scene) < 0.01 * size
-    # Without the other tube it would have fallen 176 m; it has dropped by the play of the rings, and swings.
+    # Without the other tube it would have fallen 490 m; it has dropped by the play of the rings, and swings.
     assert abs(scene.q()[2] - scene.queries[0].q[0][2]) < 0.6
     assert np.abs(scene.data.qvel).max() < 2
+
+
+def test_alpha_tubes_hang_still_once_their_swing_is_taken_from_them() -> None:
+    """They roll on each other like a pendulum, and would swing for minutes."""
+    scene = env2mjcf.load(MODELS / "alpha/alpha.env", query=MODELS / "alpha/alpha.query")
+    scene.set(scene.queries[0].q[0])
+    while scene.data.time < 5:
+        mujoco.mj_step(scene.model, scene.data)
+        scene.data.qvel *= 0.99
+    seen = fall(scene, every=0.25)
+    seen.check()
+    assert np.abs(seen.shifted).max() < 0.01 * 4.271
+    assert deepest(scene) < 0.01 * 4.271
 
 
 @pytest.mark.slow

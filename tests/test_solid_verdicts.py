@@ -20,7 +20,7 @@ ROWS = 60
 def assert_right(scene: env2mjcf.Scene, rows: int = ROWS) -> None:
     truth = Truth(scene)
     q = np.vstack([bisected(scene, truth, rows, 24, seed=3), near_obstacles(scene, rows, seed=4)])
-    verdicts = scene.in_collision(q)
+    verdicts = scene.in_collision(q, engine="mujoco")
     wrong = [
         row for row, verdict in zip(q, verdicts, strict=True) if truth.wrong(row, bool(verdict), BAND * scene.extent)
     ]
@@ -55,7 +55,7 @@ def test_the_comparison_finds_hulls_wrong() -> None:
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", collision="hull")
     truth = Truth(scene)
     q = near_obstacles(scene, 40, seed=4)
-    assert any(truth.wrong(row, bool(scene.in_collision(row)), BAND * scene.extent) for row in q)
+    assert any(truth.wrong(row, bool(scene.in_collision(row, engine="mujoco")), BAND * scene.extent) for row in q)
 
 
 def bottle_scene(folder: Path, half: float) -> env2mjcf.Scene:

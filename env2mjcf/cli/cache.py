@@ -15,25 +15,31 @@ from .printing import one_line, print_json
 
 @dataclass(frozen=True, slots=True)
 class Cache:
-    """Say what the geometry cache holds, or empty it.
+    """Say what the geometry cache holds, or empty it; or compile the exact engine, once.
 
     The cache keeps convex pieces of meshes between runs. Its folder is that of the platform, or the one that
     ENV2MJCF_CACHE_DIR names; convert, info, check and lint leave it alone with --no-cache.
 
+    The exact engine is compiled by numba at its first use, and kept beside the installed package (else where
+    NUMBA_CACHE_DIR says); "warm" does that now instead of at the first query.
+
     Examples:
       env2mjcf cache info
       env2mjcf cache clear
+      env2mjcf cache warm
 
     Attributes:
         action: What to do.
         output: How to report.
     """
 
-    action: Annotated[Literal["info", "clear"], Positional]
+    action: Annotated[Literal["info", "clear", "warm"], Positional]
     output: OutputFlags = field(default_factory=Output)
 
     def run(self) -> int:
         """Do it."""
+        if self.action == "warm":
+            return self._warm()
         from ..geometry.cache import GeometryCache, default_folder
 
         cache = GeometryCache(default_folder())
@@ -53,4 +59,19 @@ class Cache:
             print(f"removed {size} from {folder}")
         else:
             print(f"folder  {folder}\nholds   {size}\nlimit   {before.limit / 2**20:.0f} MiB")
+        return 0
+
+    def _warm(self) -> int:
+        from ..contact.exact.engine import compile_all, require
+
+        try:
+            require()
+        except ValueError as error:
+            print(f"env2mjcf: cache: {error}", file=sys.stderr)
+            return 3
+        seconds = compile_all()
+        if self.output.json:
+            print_json({"seconds": seconds})
+        else:
+            print(f"the exact engine is ready ({seconds:.1f} s)")
         return 0

@@ -52,6 +52,12 @@ class Clearance:
             out[i : i + step] = self._block(stacked[i : i + step])
         return out
 
+    def nearest_pairs(self, poses: Mapping[str, Array]) -> list[int]:
+        """Return the pairs at no distance, or else at the least; poses are (1, 4, 4)."""
+        jobs = self.pair_jobs(poses, np.arange(len(self._first)))
+        distance = Search(self._surfaces.trees, jobs, np.full(len(self._first), np.inf), self.touch).run().distance
+        return np.flatnonzero(distance <= distance.min(initial=np.inf)).tolist()
+
     def pair_jobs(self, poses: Mapping[str, Array], pairs: Ints) -> Jobs:
         """Return the relative poses of some pairs, each a group of its own; poses are (1, 4, 4)."""
         stacked = np.stack([poses[name] for name in self._names], axis=1)

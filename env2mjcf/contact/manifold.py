@@ -73,7 +73,7 @@ class Manifolds:
 
         Args:
             touching: What MuJoCo found, by index of the pair.
-            contained: Pairs of which one body lies inside the other.
+            contained: Pairs that MuJoCo does not see: of which one body lies inside the other, or that barely touch.
             poses: World poses by name, (1, 4, 4) each.
         """
         out: list[Contact] = []

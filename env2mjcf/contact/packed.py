@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..options import Engine
 from ..transforms import Array
 from .queries import ContactQueries
 from .types import PackedContacts
 
 
-def packed(queries: ContactQueries, rows: Array) -> PackedContacts:
+def packed(queries: ContactQueries, rows: Array, engine: Engine | None = None) -> PackedContacts:
     """Return the contacts of configurations (n, dim)."""
-    each = [queries.contacts(row) for row in rows]
+    each = [queries.contacts(row, engine) for row in rows]
     found = [c for contacts in each for c in contacts]
     return PackedContacts(
         np.cumsum([0, *(len(contacts) for contacts in each)], dtype=np.int64),

@@ -21,7 +21,7 @@ from .boundary import BoundaryTest
 from .clearance import Clearance
 from .containment import Containment
 from .engine import MujocoEngine
-from .exact.engine import ExactEngine, available
+from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
 from .motion import MotionBounds
 from .paths import EdgeSteps
@@ -96,14 +96,14 @@ class ContactQueries:
     def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether any tested pair touches, (n,)."""
         exact = self._chosen(engine)
-        if self._static:
+        if self._always:
             return np.ones(len(rows), dtype=bool)
         return self._hits(rows) if exact is None else exact.collisions(rows)
 
     def validities(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether rows are within limits, inside the boundary and free, (n,)."""
         exact = self._chosen(engine)
-        if self._static:
+        if self._always:
             return np.zeros(len(rows), dtype=bool)
         if exact is not None:
             return exact.validities(rows)
@@ -128,7 +128,7 @@ class ContactQueries:
     def edges_collide(self, start: Array, delta: Array, resolution: float) -> NDArray[np.bool_]:
         """Return whether anything touches at even steps of such a length of ways from (e, dim) by (e, dim), (e,)."""
         exact = self._chosen(None)
-        if self._static:
+        if self._always:
             return np.ones(len(start), dtype=bool)
         steps = self.steps.counts(start, delta, resolution)
         if exact is not None:
@@ -139,7 +139,7 @@ class ContactQueries:
     def edges_are_free(self, start: Array, delta: Array) -> NDArray[np.bool_]:
         """Return whether the ways from (e, dim) by (e, dim) are provably free, (e,)."""
         # Constant pairs are decided by themselves: a small distance of theirs must not shorten the steps.
-        if self._static or self._constant_clearance <= 0:
+        if self._always or self._constant_clearance <= 0:
             return np.zeros(len(start), dtype=bool)
         links, pairs = self._motion.links(start, delta), self._motion.pairs(start, delta)
         band = _BAND * self._assembly.extent
@@ -152,9 +152,8 @@ class ContactQueries:
 
     def warm_up(self) -> None:
         """Make ready, and compile, what verdicts need."""
-        exact = self._chosen(None)
-        if exact is not None:
-            exact.warm_up()
+        if self._chosen(None) is not None:
+            compile_all()
 
     def _hits(self, rows: Array) -> NDArray[np.bool_]:
         """Return what MuJoCo's collision detection says, and containment, (n,)."""
@@ -166,6 +165,14 @@ class ContactQueries:
 
     def _moving_clearances(self, rows: Array) -> Array:
         return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
+
+    @cached_property
+    def _always(self) -> bool:
+        """Whether bodies that cannot move against each other touch, or are inside each other: always, then."""
+        if self._static or not self._containment.needed:
+            return bool(self._static)
+        inside = self._containment.pairs_inside(self._poses_by_name(self._space.home[None]))
+        return any(self._pairs[i].constant for i, _ in inside)
 
     @cached_property
     def _constant_clearance(self) -> float:
@@ -194,8 +201,11 @@ class ContactQueries:
         """Return which of the tested pairs a contact is of."""
         return self._pair_of[frozenset((contact.link, contact.other))]
 
-    def contacts(self, row: Array) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
+    def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches; none if none does."""
+        exact = self._chosen(engine)
+        if exact is not None and not self.collisions(row[None], engine)[0]:
+            return []
         found: dict[int, list[Touch]] = {}
         for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
             index = self._pair_of[frozenset((a, b))]
@@ -206,11 +216,14 @@ class ContactQueries:
         for contact in self._static:
             index = self._pair_of[frozenset((contact.link, contact.other))]
             found.setdefault(index, []).append(Touch(contact.position, contact.normal, contact.distance))
-        if not found and not self._containment.needed:
+        if not found and exact is None and not self._containment.needed:
             return []
         poses = self._poses_by_name(row[None])
-        contained = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
-        return self._triangles.manifolds.contacts(found, contained, poses)
+        others = [index for index, _ in self._containment.pairs_inside(poses)] if self._containment.needed else []
+        if not found and not others and exact is not None:
+            # Within the band of contact, cells may part what triangles say touches.
+            others = self._triangles.clearance.nearest_pairs(poses)
+        return self._triangles.manifolds.contacts(found, others, poses)
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)

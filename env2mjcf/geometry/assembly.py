@@ -160,14 +160,15 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies])
     thickness = _THICKNESS_PER_EXTENT * float(np.linalg.norm(upper - lower))
     _check_extent(environment, float(np.linalg.norm(upper - lower)), log)
+    active, drawn = ({id(m) for m in group} for group in (environment.robots, environment.surfaces))
     robots: dict[int, RobotParts] = {}
     obstacles: list[Part] = []
     surfaces: list[Part] = []
     for multibody, kinematics, home, bodies in placed:
-        if _is_one_of(multibody, environment.robots):
+        if id(multibody) in active:
             links = tuple(meshes.part(b, thickness, moves=True) for b in bodies)
             robots[id(multibody)] = RobotParts(kinematics, home, links)
-        elif _is_one_of(multibody, environment.surfaces):
+        elif id(multibody) in drawn:
             surfaces += [meshes.part(b, None, moves=False) for b in bodies]
         else:
             obstacles += [meshes.part(b, thickness, moves=False) for b in bodies]
@@ -236,10 +237,6 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
                     "the scene reads, but does not convert",
                     hint="replace it by Revolute joints", span=connection.span,
                 )  # fmt: skip
-
-
-def _is_one_of(multibody: MultiBody, group: Sequence[MultiBody]) -> bool:
-    return any(multibody is m for m in group)
 
 
 def _bounding_box(bodies: Sequence[_Placed]) -> tuple[Array, Array]:

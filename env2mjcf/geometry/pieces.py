@@ -28,7 +28,8 @@ class ConvexPiece:
         vertices: (k, 3) float64, read-only, relative to `center`, so that rounding to float32 is relative to the
             size of the piece and not to its place.
         center: (3,) float64, read-only, in the mesh's frame.
-        polygon: The polygon of the surface that it stands for, over the analysis's vertices; None for a hull.
+        polygon: The polygon of the surface, over the analysis's vertices, for all or a part of which it stands; None
+            for a hull.
     """
 
     vertices: Floats

@@ -192,8 +192,9 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
 
 def _shell_note(lining: Shells, volume: float) -> str:
     pinned = f"{_count(lining.pinned, 'thin prism')} where there is no room" if lining.pinned else "none a thin prism"
+    split = f"{_count(lining.split, 'polygon')} split at thin spots, " if lining.split else ""
     return (
-        f"{_count(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, "
+        f"{_count(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, {split}"
         f"thinnest {lining.thinnest:.3g}, {lining.volume / volume:.3g} times the solid's volume"
     )
 

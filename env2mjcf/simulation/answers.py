@@ -141,12 +141,13 @@ class Answers:
 
     # Contacts.
 
-    def contacts(self, q: ArrayLike) -> list[Contact]:
+    def contacts(self, q: ArrayLike, *, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
 
-        Pairs that cannot move are included.
+        There are some just where `in_collision` says so. Pairs that cannot move are included. Places, normals and
+        depths come from MuJoCo and from triangles, whichever engine says that there are any.
         """
-        return self._queries.contacts(self._row(q))
+        return self._queries.contacts(self._row(q), engine)
 
     def packed_contacts(
         self,
@@ -155,6 +156,7 @@ class Answers:
         threads: int | None = None,
         executor: Executor | None = None,
         progress: bool = False,
+        engine: Engine | None = None,
     ) -> PackedContacts:
         """Return the contacts of many configurations as arrays: those of `contacts`, row by row, in its order.
 
@@ -165,6 +167,7 @@ class Answers:
             threads: As for `in_collision`.
             executor: As for `in_collision`.
             progress: Show a progress bar on a terminal.
+            engine: Override the scene's engine.
 
         Raises:
             ValueError: q has a wrong shape or a value that is not finite.
@@ -177,7 +180,7 @@ class Answers:
         def store(where: slice, answers: PackedContacts) -> None:
             parts[where.start] = answers
 
-        question = Question(packed, (rows,), (), self._queries.row_bytes())
+        question = Question(packed, (rows,), (engine,), self._queries.row_bytes())
         ask(self._queries, question, store, threads, executor, progress)
         return joined([parts[start] for start in sorted(parts)])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import threading
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -159,6 +160,21 @@ class Scene(Answers):
         rows = self.space.check(q)
         errors = self._loop_errors(np.atleast_2d(rows))
         return errors if rows.ndim == 2 else errors[0].item()
+
+    def warm_up(self, *, wait: bool = True) -> float:
+        """Make ready what the first query would have to wait for; return the seconds that it took.
+
+        The exact engine is compiled at its first use, and kept on disk for later ones.
+
+        Args:
+            wait: False works in a thread of its own, and returns 0.0 at once.
+        """
+        if not wait:
+            threading.Thread(target=self._queries.warm_up, name="env2mjcf-warm-up", daemon=True).start()
+            return 0.0
+        start = time.perf_counter()
+        self._queries.warm_up()
+        return time.perf_counter() - start
 
     # Pickling: the model and the compiled scene travel, the rest is built again.
 

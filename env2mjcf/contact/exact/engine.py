@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,6 +17,7 @@ from ...space import ConfigurationSpace
 from ...transforms import Array
 from ..surfaces import Surfaces
 from .program import program
+from .tables import Table, packed
 
 Bools = NDArray[np.bool_]
 
@@ -54,8 +56,6 @@ class ExactEngine:
     ) -> None:
         require()
         self._tables = program(assembly, space, pairs, surfaces)
-        self._links, self._pairs = sum(len(r.links) for r in assembly.robots), sum(p.kind != "obstacle" for p in pairs)
-        self._home = np.ascontiguousarray(space.home[None])
         self._entries = _entries()
 
     def collisions(self, q: Array) -> Bools:
@@ -98,11 +98,19 @@ class ExactEngine:
         self._entries.edges_are_free(*self._tables, start, delta, speeds, pair_speeds, band, out)
         return out
 
-    def warm_up(self) -> None:
-        """Compile everything, or take it from the disk."""
-        q = self._home
-        self.collisions(q)
-        self.validities(q)
-        self.distances(q)
-        self.edges_collide(q, q, np.array([2]))
-        self.edges_are_free(q, q, np.zeros((1, self._links)), np.zeros((1, self._pairs)), 0.0)
+
+def compile_all() -> float:
+    """Compile everything, or take it from the disk, and return the seconds that it took.
+
+    What is compiled is the same for every scene: tables of any kind will do, such as empty ones.
+    """
+    start = time.perf_counter()
+    nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
+    entries, tables = _entries(), packed(nothing)
+    rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
+    entries.collisions(*tables, rows, answers)
+    entries.validities(*tables, rows, answers)
+    entries.distances(*tables, rows, floats)
+    entries.edges_collide(*tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
+    entries.edges_are_free(*tables, rows, rows, rows, rows, 0.0, answers)
+    return time.perf_counter() - start

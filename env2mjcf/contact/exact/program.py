@@ -122,7 +122,7 @@ class _Shapes:
             child = np.where(tree.child > 0, tree.child + nodes[k], tree.child)
             children.append(np.where(tree.child < 0, tree.child - blocks[k], child))
             surface = self._surfaces.surface(k)
-            kind = (int(surface.box is not None), int(surface.solid))
+            kind = (int(surface.box is not None), surface.solid * (1 if surface.outward else 2))
             # The root has one lane, the whole, which is tested before walks begin; unless that is all there is.
             start = nodes[k] + max(int(tree.child[0, 0]), 0)
             rows.append((int(nodes[k]), int(start), *kind, int(points[k]), int(points[k + 1])))

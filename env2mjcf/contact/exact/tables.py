@@ -18,8 +18,8 @@ class Table(IntEnum):
         STEPS: (s, 8) parent, motion and columns of the steps of kinematics.
         LINKS: (l, 5) step, shape, root of the tree over the obstacles that the link is tested with, or -1; its first
             vertex and the one after the last.
-        SHAPES: (k, 6) root; where walks over its tree alone begin; is it a box; does its inside count; its first
-            component point and the one after the last.
+        SHAPES: (k, 6) root; where walks over its tree alone begin; is it a box; does its inside count: 0 not, 1
+            yes, 2 yes, though its triangles are not wound alike; its first component point and the one after the last.
         CHILDREN: (n, 8) of the nodes of the meshes' trees; see `WideTree`.
         OBSTACLES: (o, 1) shape.
         TOP_CHILDREN: (n, 8) of the trees over obstacles; a leaf is ~obstacle.

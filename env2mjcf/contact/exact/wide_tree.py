@@ -162,6 +162,10 @@ class _Builder:
         self.order[branch.start : branch.stop] = rows[order[:, axis]]
         return branch.start + cut
 
+    def _weight(self, branch: int) -> tuple[float, int]:
+        b = self._branches[branch]
+        return b.surface, b.stop - b.start
+
     def _widen(self) -> None:
         """Give each node the branches that are left when the widest of its branches are opened, until it is full."""
         self._nodes.append([(0, 0)])
@@ -178,7 +182,7 @@ class _Builder:
                 inner = [b for b in lanes if self._branches[b].halves is not None]
                 if not inner:
                     break
-                widest = max(inner, key=lambda b: self._branches[b].surface)
+                widest = max(inner, key=self._weight)
                 halves = self._branches[widest].halves
                 assert halves is not None
                 at = lanes.index(widest)

@@ -1,4 +1,4 @@
-"""Mitred shells: convex cells whose outer faces are exactly the polygons of a closed surface."""
+"""Shells: convex cells whose outer faces are exactly the polygons of a closed surface, and which lie inside it."""
 
 from .building import Shells, shells
 

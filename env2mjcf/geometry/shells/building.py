@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,8 @@ from ..topology import Ints
 from .corners import cell_corners
 from .doubts import doubtful_polygons
 from .pairing import pair_sides
-from .thickness import fit
+from .splitting import split_thin
+from .thickness import Surroundings, fit
 from .walls import Group, groups
 
 THICKEST = 0.02
@@ -36,6 +38,7 @@ class Shells:
         pieces: In the order of their polygons.
         pinned: How many are thin prisms, because there is no room for a cell.
         tilted: How many cells lean further than their edges ask for, to make way for another part of the surface.
+        split: How many polygons are cut, because only a part of their cells would have to be thin.
         thinnest: Height of the lowest piece.
         volume: Of all cells together; where they overlap it counts once for each.
         missing: Polygons that are too small for MuJoCo.
@@ -44,13 +47,14 @@ class Shells:
     pieces: tuple[ConvexPiece, ...]
     pinned: int
     tilted: int
+    split: int
     thinnest: float
     volume: float
     missing: tuple[Polygon, ...]
 
 
 def shells(analysis: Analysis, faces: Ints, thickness: float) -> Shells:
-    """Line the inside of a closed surface with convex cells that meet in bisector planes.
+    """Line the inside of a closed surface with convex cells, which overlap at its convex edges.
 
     Args:
         analysis: Of a `solid` mesh.
@@ -66,43 +70,64 @@ def shells(analysis: Analysis, faces: Ints, thickness: float) -> Shells:
     sides = pair_sides(vertices, chosen, normals)
     solid = np.where(analysis.component_volumes > 0, np.arange(analysis.components), -1)[analysis.component]
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
-    found: list[ConvexPiece | None] = [None] * len(polygons)
-    # Height, volume, and whether a side is tilted.
-    measures = np.zeros((len(polygons), 3))
+    around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing)
+    found: list[tuple[_Cell, ...]] = [()] * len(polygons)
     for group in groups(vertices, chosen, polygons, sides.slopes, THICKEST * analysis.diagonal):
-        fit(group, vertices[analysis.faces], solid, of_polygon[group.members], nothing)
-        for row, piece, height, volume in _cells(group, polygons, analysis, thickness):
-            number = int(group.members[row])
-            found[number] = piece
-            measures[number] = height, volume, group.tilted[row]
-    doubtful = doubtful_polygons(analysis, polygons, found, sides, thickness)
+        for number, cells in _fitted(group, around, polygons, analysis, thickness):
+            found[number] = cells
+    pieces = [[cell.piece for cell in cells] for cells in found]
+    doubtful = doubtful_polygons(analysis, polygons, pieces, sides, thickness)
     bare, standing = list(doubtful), list(doubtful.values())
     pins = {id(p.polygon): p for p in prisms(vertices, standing, thickness, inward=True)}
     for i, polygon in zip(bare, standing, strict=True):
-        found[i] = pins.get(id(polygon))
-    missing = tuple(polygons[i] for i in bare if found[i] is None)
-    measures[bare] = thickness, 0.0, 0.0
+        pin = pins.get(id(polygon))
+        found[i] = () if pin is None else (_Cell(pin, thickness, 0.0, False),)
+    every = [cell for cells in found for cell in cells]
     return Shells(
-        pieces=tuple(piece for piece in found if piece is not None),
+        pieces=tuple(cell.piece for cell in every),
         pinned=len(pins),
-        tilted=int(measures[:, 2].sum()),
-        thinnest=float(measures[:, 0].min()),
-        volume=float(measures[:, 1].sum()),
-        missing=missing,
+        tilted=sum(cell.tilted for cell in every),
+        split=sum(len(cells) > 1 for cells in found),
+        thinnest=min((cell.height for cell in every), default=thickness),
+        volume=sum(cell.volume for cell in every),
+        missing=tuple(polygons[i] for i in bare if not found[i]),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cell:
+    """A piece, its height and volume, and whether a side is tilted."""
+
+    piece: ConvexPiece
+    height: float
+    volume: float
+    tilted: bool
+
+
+def _fitted(
+    group: Group, around: Surroundings, polygons: tuple[Polygon, ...], analysis: Analysis, thickness: float
+) -> Iterator[tuple[int, tuple[_Cell, ...]]]:
+    """Yield the cells under each polygon of a group for which there is room; parts after wholes."""
+    wanted = group.slopes.copy()
+    fit(group, around)
+    for row, cell in _cells(group, polygons, analysis, thickness):
+        yield int(group.members[row]), (cell,)
+    for row, parts in split_thin(group, wanted, around, THICKEST * analysis.diagonal):
+        cells = [cell for part in parts for _, cell in _cells(part, polygons, analysis, thickness)]
+        if len(cells) == len(parts):
+            yield int(group.members[row]), tuple(cells)
 
 
 def _cells(
     group: Group, polygons: tuple[Polygon, ...], analysis: Analysis, thickness: float
-) -> list[tuple[int, ConvexPiece, float, float]]:
-    """Return (row, piece, height, volume) of the cells of a group that MuJoCo can hold."""
+) -> Iterator[tuple[int, _Cell]]:
+    """Yield row and cell of those of a group that MuJoCo can hold."""
     corners = cell_corners(group, analysis.tolerance)
     length = np.ptp(group.corners, axis=1).max(axis=1)
     least = np.maximum(_THINNEST * analysis.diagonal, 2 * SLENDEREST * length)
     good = (
         (corners.depths >= least) & (corners.depths > thickness) & ~too_narrow(group.corners, group.normals, thickness)
     )
-    out: list[tuple[int, ConvexPiece, float, float]] = []
     for row in np.flatnonzero(good).tolist():
         points = corners.points[row][corners.used[row]]
         mean = points.mean(axis=0)
@@ -110,5 +135,4 @@ def _cells(
         local.setflags(write=False)
         center.setflags(write=False)
         piece = ConvexPiece(local, center, polygons[group.members[row]])
-        out.append((row, piece, float(corners.depths[row]), float(corners.volumes[row])))
-    return out
+        yield row, _Cell(piece, float(corners.depths[row]), float(corners.volumes[row]), bool(group.tilted[row]))

@@ -1,4 +1,4 @@
-"""The corners of the cells: a convex polygon shrinks as the depth grows, each edge at its own speed."""
+"""The corners of the cells: a convex polygon whose edges move as the depth grows, each at its own speed."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..topology import Bools, Floats, Ints
-from .walls import Group
-
-# Sine of the angle between two edges below which they are taken for parallel.
-_PARALLEL = 1e-9
+from .walls import PARALLEL, Group
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +124,7 @@ class _Shrinking:
         u, v, n = group.inward[rows, first], group.inward[rows, second], group.normals[rows]
         sine = np.einsum("gj,gj->g", n, np.cross(u, v))[:, None]
         move = group.slopes[rows, first, None] * np.cross(v, n) + group.slopes[rows, second, None] * np.cross(n, u)
-        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > _PARALLEL)
+        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
 
     def _sweep(self, rows: Ints, depth: Floats) -> None:
         """Add the volume between the last depth and this one; areas are quadratic in depth, so Simpson is exact."""

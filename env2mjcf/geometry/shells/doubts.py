@@ -18,7 +18,7 @@ from .pairing import Sides
 def doubtful_polygons(
     analysis: Analysis,
     polygons: Sequence[Polygon],
-    cells: Sequence[ConvexPiece | None],
+    cells: Sequence[Sequence[ConvexPiece]],
     sides: Sides,
     thickness: float,
 ) -> dict[int, Polygon]:
@@ -31,18 +31,19 @@ def doubtful_polygons(
     Args:
         analysis: The mesh.
         polygons: Of the surface.
-        cells: The cell of each polygon; None where there was no room.
+        cells: The cells of each polygon; none where there was no room.
         sides: How faces are paired at their edges.
         thickness: Depth at which polygons without a cell are asked.
     """
-    # A surface that passes through itself leaves no room for some cell.
-    suspect = sides.folded or any(cell is None for cell in cells)
-    patch = np.arange(len(polygons)) if suspect else _patches(polygons, cells, sides.links)
-    asked = np.array([i for i, cell in enumerate(cells) if cell is not None], dtype=np.int64)
-    asked = asked[np.unique(patch[asked], return_index=True)[1]]
-    insides = [cell.center for i in asked if (cell := cells[i]) is not None]
-    wrong = patch[asked[~_inside(analysis, np.reshape(insides, (-1, 3)))]]
-    doubtful = [i for i, cell in enumerate(cells) if cell is None or patch[i] in wrong]
+    # A surface that passes through itself, or touches itself, leaves no room for some cell, or cuts it.
+    suspect = sides.folded or any(len(own) != 1 for own in cells)
+    patch = np.arange(len(polygons)) if suspect else _patches(polygons, sides.links)
+    some = range(len(cells)) if suspect else np.unique(patch, return_index=True)[1].tolist()
+    asked = [(i, cell) for i in some for cell in cells[i]]
+    insides = np.reshape([cell.center for _, cell in asked], (-1, 3))
+    outside = ~_inside(analysis, insides)
+    wrong = patch[[i for (i, _), out in zip(asked, outside.tolist(), strict=True) if out]]
+    doubtful = [i for i, own in enumerate(cells) if not own or patch[i] in wrong]
     middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
     turn = ~_inside(analysis, middles - step) & _inside(analysis, middles + step)
@@ -52,15 +53,12 @@ def doubtful_polygons(
     }
 
 
-def _patches(polygons: Sequence[Polygon], cells: Sequence[ConvexPiece | None], links: Ints) -> Ints:
-    """Label polygons with cells that are linked, (len(polygons),)."""
+def _patches(polygons: Sequence[Polygon], links: Ints) -> Ints:
+    """Label polygons that are linked side to side, (len(polygons),)."""
     of_face = np.empty(sum(len(p.faces) for p in polygons), dtype=np.int64)
     for i, polygon in enumerate(polygons):
         of_face[list(polygon.faces)] = i
-    full = np.array([cell is not None for cell in cells])
-    a, b = of_face[links[:, 0]], of_face[links[:, 1]]
-    both = full[a] & full[b]
-    return connected(len(polygons), a[both], b[both])
+    return connected(len(polygons), of_face[links[:, 0]], of_face[links[:, 1]])
 
 
 def _inside(analysis: Analysis, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

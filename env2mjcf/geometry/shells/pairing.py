@@ -1,4 +1,4 @@
-"""Which two faces bound the solid at an edge, and how the plane between their cells leans."""
+"""Which two faces bound the solid at an edge, and how the sides of their cells lean there."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from ..topology import Floats, Ints, edges
 # Angles in radians below which two faces coincide: the solid that touches here is another one.
 _COINCIDENT = 1e-6
 
+# Angles between the faces of a solid from which on an edge counts as blunt: sides that follow the neighbour would reach
+# far beyond the polygon, and cost time.
+_BLUNT = 0.9 * np.pi
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sides:
     """What happens at each edge of each face.
 
     Attributes:
-        slopes: (m, 3) how much the cell of the face must recede per unit of depth.
+        slopes: (m, 3) how much the cell of the face recedes per unit of depth at each edge; negative where it grows.
         links: (p, 2) pairs of faces that bound the same wedge of the solid at some edge.
         folded: Whether faces lie upon each other at some edge.
     """
@@ -28,11 +32,15 @@ class Sides:
 
 
 def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
-    """Find the partner of each face at each of its edges, and the plane that divides the solid between their cells.
+    """Find the partner of each face at each of its edges, and how the cell's side leans there.
 
-    The bisector plane of an edge with interior angle theta recedes by cot(theta / 2); at reflex, flat and open edges
-    the cell goes straight down. Where more than two faces meet, the partner of a face is the first one of opposite
-    direction that a rotation from the face into the solid finds.
+    At a convex edge the side lies in the partner's face, and leans outward at an obtuse one, so that the cell fills
+    the wedge between the two, and the partner's cell does too. Bisector planes between them would make blades of the
+    cells: a body that lies on one face would touch with the blades of all others, and several contacts of a blade get
+    the normal of its own side, not of the face. At blunt, flat, reflex and open edges the side goes straight down.
+
+    Where more than two faces meet, the partner of a face is the first one of opposite direction that a rotation from
+    the face into the solid finds.
 
     Args:
         vertices: (n, 3).
@@ -54,8 +62,8 @@ def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
     order = np.lexsort((there, angle, here))
     first = order[np.concatenate([[True], np.diff(here[order]) > 0])[: len(order)]]
     slopes = np.zeros(faces.size)
-    convex = first[angle[first] < np.pi]
-    slopes[here[convex]] = 1 / np.tan(angle[convex] / 2)
+    convex = first[angle[first] < _BLUNT]
+    slopes[here[convex]] = 1 / np.tan(angle[convex])
     links = np.stack([here[first] // 3, there[first] // 3], axis=1)
     return Sides(slopes.reshape(-1, 3), links, bool((angle > 2 * np.pi - _COINCIDENT).any()))
 

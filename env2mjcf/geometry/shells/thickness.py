@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..topology import Bools, Floats, Ints
@@ -13,59 +16,87 @@ _NUMBERS = 3_000_000  # heights held in memory at once
 _ROUNDS = 200
 
 
-def fit(group: Group, triangles: Floats, blocking: Ints, kind: Ints, margin: float) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What may reach into cells.
+
+    Attributes:
+        triangles: (m, 3, 3).
+        blocking: (m,) number of the solid that a triangle bounds; -1 for a cavity, which blocks every cell.
+        kind: (p,) number of the solid that each polygon is of; -1 for cavities, whose cells every triangle blocks.
+        margin: Length by which a triangle may reach through a cell's top or bottom without being there.
+    """
+
+    triangles: Floats
+    blocking: Ints
+    kind: Ints
+    margin: float
+
+
+def fit(group: Group, around: Surroundings) -> None:
     """Lower cells, or tilt their sides, until no triangle is left in them.
 
-    All sides lean inward or go straight down, so a point of a cell can leave the solid only through a face within
-    the cell: a cell that no face reaches lies in the solid.
+    A cell has its outer face in common with the solid, so that its points near there are inside, and it is convex: a
+    path to any other of its points would leave the solid through a face within the cell. So a cell that no face
+    reaches lies in the solid.
 
     Args:
         group: Its slopes, heights and `tilted` are changed.
-        triangles: (m, 3, 3).
-        blocking: (m,) number of the solid that a triangle bounds; -1 for a cavity, which blocks every cell.
-        kind: (g,) number of the solid that each cell is of; -1 for cells of a cavity, which every triangle blocks.
-        margin: Length by which a triangle may reach into a cell without being there.
+        around: The surface.
     """
-    low, high = group.boxes()
-    cell, other = near(low, high, triangles.min(axis=1), triangles.max(axis=1))
-    matters = (kind[cell] < 0) | (blocking[other] < 0) | (kind[cell] == blocking[other])
-    cell, other = cell[matters], other[matters]
+    cell, other = _near(group, around)
     for _ in range(_ROUNDS):
         if len(cell) == 0:
             return
-        cell, other, start, ratio = _left_over(group, triangles, cell, other, margin)
+        found = [_extent(group, *block) for block in pieces(group, around, cell, other)]
+        cell, other, start, ratio = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if len(cell):
             _give_way(group, cell, start, ratio)
     group.height[np.unique(cell)] = 0.0
 
 
-def _left_over(
-    group: Group, triangles: Floats, cell: Ints, other: Ints, margin: float
-) -> tuple[Ints, Ints, Floats, Floats]:
-    """Return the pairs of which a piece of the triangle lies in the cell.
+def within(group: Group, around: Surroundings) -> Floats:
+    """Return the corners (n, 3), about the cell's centre, of all that reaches into a group of one cell."""
+    blocks = pieces(group, around, *_near(group, around))
+    return np.concatenate(
+        [np.zeros((0, 3)), *(points[np.arange(points.shape[1]) < count[:, None]] for _, _, points, count in blocks)]
+    )
 
-    With them the least depth of the piece, and for each side the greatest distance inside of its edge's line per
-    unit of depth.
-    """
-    corners = group.corners.shape[1]
-    step = max(1, _NUMBERS // (3 * (corners + 2)))
-    out: list[tuple[Ints, Ints, Floats, Floats]] = []
+
+def _near(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
+    """Return the pairs of cells and triangles that may meet and matter."""
+    low, high = group.boxes()
+    cell, other = near(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1))
+    kind, blocking = around.kind[group.members][cell], around.blocking[other]
+    matters = (kind < 0) | (blocking < 0) | (kind == blocking)
+    return cell[matters], other[matters]
+
+
+def pieces(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Iterator[tuple[Ints, Ints, Floats, Ints]]:
+    """Yield blocks of cells, triangles, and what of each triangle lies in the cell: corners (n, k, 3), counts (n,)."""
+    step = max(1, _NUMBERS // (3 * (group.corners.shape[1] + 2)))
     for i in range(0, len(cell), step):
         c, t = cell[i : i + step], other[i : i + step]
-        local = triangles[t] - group.centers[c, None]
-        planes = group.planes(c, margin)
+        local = around.triangles[t] - group.centers[c, None]
+        planes = group.planes(c, around.margin)
         chosen = np.flatnonzero(~_behind_a_plane(local, planes))
         c, t, local, planes = c[chosen], t[chosen], local[chosen], planes[chosen]
         points, count = clipped(local, planes)
         chosen = np.flatnonzero(count)
-        c, t, points, count = c[chosen], t[chosen], points[chosen], count[chosen]
-        used = np.arange(points.shape[1]) < count[:, None]
-        depth = np.where(used, -np.einsum("nkj,nj->nk", points, group.normals[c]), np.inf)
-        inside = np.einsum("nkj,nij->nki", points, group.inward[c]) + group.reach[c, None]
-        ratio = np.where(used[:, :, None], inside / depth[:, :, None], 0.0)
-        out.append((c, t, depth.min(axis=1, initial=np.inf), ratio.max(axis=1, initial=0.0)))
-    joined = [np.concatenate(parts) for parts in zip(*out, strict=True)]
-    return joined[0], joined[1], joined[2], joined[3]
+        yield c[chosen], t[chosen], points[chosen], count[chosen]
+
+
+def _extent(group: Group, c: Ints, t: Ints, points: Floats, count: Ints) -> tuple[Ints, Ints, Floats, Floats]:
+    """Return the pairs of cells and triangles, and the extents of their pieces.
+
+    These are the least depth of the piece, and for each side the greatest distance inside of its edge's line per
+    unit of depth.
+    """
+    used = np.arange(points.shape[1]) < count[:, None]
+    depth = np.where(used, -np.einsum("nkj,nj->nk", points, group.normals[c]), np.inf)
+    inside = np.einsum("nkj,nij->nki", points, group.inward[c]) + group.reach[c, None]
+    ratio = np.where(used[:, :, None], inside / depth[:, :, None], 0.0)
+    return c, t, depth.min(axis=1, initial=np.inf), ratio.max(axis=1, initial=0.0)
 
 
 def _behind_a_plane(local: Floats, planes: Floats) -> Bools:
@@ -83,7 +114,8 @@ def _give_way(group: Group, cell: Ints, start: Floats, ratio: Floats) -> None:
     limits = np.divide(reach, slopes, out=np.full(slopes.shape, np.inf), where=slopes > 0)
     limits = np.minimum(limits, group.height[cell, None])
     lowered = np.minimum(start / 2, limits.min(axis=1))
-    leaning = np.minimum(reach / (2 * ratio), _least_of_others(limits))
+    room = np.divide(reach, 2 * ratio, out=np.full(ratio.shape, np.inf), where=ratio > 0)
+    leaning = np.minimum(room, _least_of_others(limits))
     side = leaning.argmax(axis=1)
     best = np.maximum(lowered, leaning.max(axis=1))
     order = np.lexsort((np.arange(len(cell)), best, cell))

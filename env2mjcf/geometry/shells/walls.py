@@ -11,6 +11,13 @@ from ..pieces import by_length, corner_loops
 from ..polygons import Polygon
 from ..topology import Bools, Floats, Ints
 
+PARALLEL = 1e-9
+"""Sine of the angle between two edges below which they are taken for parallel."""
+
+_SIDE_MARGIN = 0.01
+"""Margin of the sides in units of that of top and bottom. Polygons may be bent by the whole margin, sides follow their
+edges exactly; and what is overlooked where two sides meet at a sharp corner is many margins wide."""
+
 
 @dataclass(slots=True, eq=False)
 class Group:
@@ -26,7 +33,7 @@ class Group:
         normals: (g, 3).
         inward: (g, k, 3) unit vectors in the polygon's plane, square to the edge that begins at each corner.
         reach: (g, k) distance of the centre from each edge's line.
-        slopes: (g, k) how far each side recedes per unit of depth; not negative.
+        slopes: (g, k) how far each side recedes per unit of depth; negative where it leans outward.
         height: (g,).
         tilted: (g,) whether a side leans more than its edge asks for.
     """
@@ -53,7 +60,7 @@ class Group:
         return np.minimum(self.height, limits.min(axis=1))
 
     def planes(self, rows: Ints, margin: float) -> Floats:
-        """Return the planes (len(rows), k + 2, 4) of some cells, moved inward by a margin, about the cells' centres.
+        """Return the planes (len(rows), k + 2, 4) of some cells about their centres, moved inward by a margin.
 
         The last two are the polygon's own and the bottom; x . plane[:3] + plane[3] >= 0 inside.
         """
@@ -61,16 +68,25 @@ class Group:
         scale = np.sqrt(1 + slopes**2)
         sides = (self.inward[rows] + slopes[:, :, None] * normal[:, None]) / scale[:, :, None]
         # The edges' lines lie in the plane through the centre, so the slope does not enter their offsets.
-        offsets = self.reach[rows] / scale - margin
+        offsets = self.reach[rows] / scale - _SIDE_MARGIN * margin
         top = np.column_stack([-normal, np.full(len(rows), -margin)])
         bottom = np.column_stack([normal, self.height[rows] - margin])
         return np.concatenate([np.concatenate([sides, offsets[:, :, None]], axis=2), top[:, None], bottom[:, None]], 1)
 
     def boxes(self) -> tuple[Floats, Floats]:
-        """Return the corners of boxes around the cells, (g, 3) each; sides never lean outward."""
-        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
-        down = -self.normals * self.height[:, None]
-        return self.centers + low + np.minimum(down, 0), self.centers + high + np.maximum(down, 0)
+        """Return the corners of boxes around the cells, (g, 3) each."""
+        bottom = self.corners + self.height[:, None, None] * (self._outward() - self.normals[:, None])
+        both = np.concatenate([self.corners, bottom], axis=1)
+        return self.centers + both.min(axis=1), self.centers + both.max(axis=1)
+
+    def _outward(self) -> Floats:
+        """Return how far the corners move per unit of depth, (g, k, 3), were there no sides that lean inward."""
+        after = np.minimum(self.slopes, 0.0)
+        before = np.roll(after, 1, axis=1)
+        u, v, n = np.roll(self.inward, 1, axis=1), self.inward, self.normals[:, None]
+        sine = np.einsum("gkj,gkj->gk", np.broadcast_to(n, u.shape), np.cross(u, v))[:, :, None]
+        move = before[:, :, None] * np.cross(v, n) + after[:, :, None] * np.cross(n, u)
+        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
 
 
 def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slopes: Floats, cap: float) -> list[Group]:
@@ -89,24 +105,27 @@ def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slop
     for members in by_length(loops):
         corners = vertices[np.array([loops[i] for i in members])]
         normals = np.array([polygons[i].normal for i in members])
-        centers = corners.mean(axis=1)
-        local = corners - centers[:, None]
-        along = np.roll(local, -1, axis=1) - local
-        inward = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
-        inward /= np.linalg.norm(inward, axis=2, keepdims=True)
-        out.append(
-            Group(
-                members=np.array(members, dtype=np.int64),
-                centers=centers,
-                corners=local,
-                normals=normals,
-                inward=inward,
-                reach=-np.einsum("gkj,gkj->gk", inward, local),
-                slopes=np.array([slopes[i] for i in members]),
-                height=np.full(len(members), cap),
-            )
-        )
+        out.append(group_of(np.array(members), corners, normals, np.array([slopes[i] for i in members]), cap))
     return out
+
+
+def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, height: float) -> Group:
+    """Set up a group from its polygons' corners (g, k, 3) in the mesh's frame, normals (g, 3) and slopes (g, k)."""
+    centers = corners.mean(axis=1)
+    local = corners - centers[:, None]
+    along = np.roll(local, -1, axis=1) - local
+    inward = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
+    inward /= np.linalg.norm(inward, axis=2, keepdims=True)
+    return Group(
+        members=members,
+        centers=centers,
+        corners=local,
+        normals=normals,
+        inward=inward,
+        reach=-np.einsum("gkj,gkj->gk", inward, local),
+        slopes=slopes,
+        height=np.full(len(members), height),
+    )
 
 
 def _loop_slopes(

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from .clearances import least_time
+from .clearances import least_distance
 from .collisions import collides, measure
 from .compiling import SOURCES, compiled, entry
-from .edges import edge_collides, edge_is_free
+from .edges import edge_collides
 from .frames import place
 from .opening import Room, Tables, opened, room
+from .proofs import LEVELS, edge_is_free
 from .validity import within_boundary, within_limits
 
 Entry = Callable[..., None]
@@ -40,13 +41,13 @@ def _validities(tables: Tables, room: Room, q: Any, out: Any) -> None:
 
 
 @compiled
-def _distances(tables: Tables, room: Room, q: Any, speeds: Any, pair_speeds: Any, out: Any) -> None:
+def _distances(tables: Tables, room: Room, q: Any, out: Any) -> None:
     for i in range(len(q)):
         place(tables, q[i], room.frames)
         measure(tables, room)
         out[i] = -1.0
         if not collides(tables, room):
-            distance = least_time(tables, room, speeds, pair_speeds, _FAR)
+            distance = least_distance(tables, room, _FAR)
             out[i] = distance if distance < _FAR else np.inf
 
 
@@ -58,10 +59,13 @@ def _edges_collide(tables: Tables, room: Room, start: Any, delta: Any, steps: An
 
 @compiled
 def _edges_are_free(
-    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float, out: Any
-) -> None:
+    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float,
+    stretches: Any, runs: Any, pending: Any, out: Any,
+) -> None:  # fmt: skip
     for i in range(len(start)):
-        out[i] = edge_is_free(tables, room, start[i], delta[i], speeds[i], pair_speeds[i], band)
+        out[i] = edge_is_free(
+            tables, room, start[i], delta[i], speeds[i], pair_speeds[i], band, stretches, runs, pending
+        )
 
 
 def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
@@ -81,7 +85,7 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
     def distances(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _distances(tables, room(tables), q, np.ones(len(tables.links)), np.ones(len(tables.pairs)), out)
+        _distances(tables, room(tables), q, out)
 
     @entry
     def edges_collide(integers: Any, floats: Any, start: Any, delta: Any, steps: Any, out: Any) -> None:
@@ -95,7 +99,10 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
     ) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _edges_are_free(tables, room(tables), start, delta, speeds, pair_speeds, band, out)
+        stretches, runs = np.empty((2 * LEVELS, 2)), np.empty((2 * LEVELS, 2), dtype=np.int64)
+        # As many lists as levels, each of all pairs at the most.
+        pending = np.empty((LEVELS + 1) * (len(tables.links) * len(tables.obstacles) + len(tables.pairs)), np.int64)
+        _edges_are_free(tables, room(tables), start, delta, speeds, pair_speeds, band, stretches, runs, pending, out)
 
     return collisions, validities, distances, edges_collide, edges_are_free
 

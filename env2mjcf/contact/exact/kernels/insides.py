@@ -9,7 +9,8 @@ from .opening import Tables
 from .poses import Vector, larger, smaller
 
 _LANES, _BLOCK = 8, 4
-_START = 1
+_START, _IS_SOLID = 1, 3
+_ORIENTED = 1
 
 # The ray goes up along z and leans by this much, so that it meets no edge of a mesh whose edges run along its axes.
 _LEAN_X, _LEAN_Y = 0.0123917, 0.0271813
@@ -43,7 +44,8 @@ def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) 
                     count += 1
                 else:
                     winding += _crossings(tables.blocks[~children[k]], u, v, z)
-    return winding != 0
+    # Where the triangles are not wound alike, only whether they are an even number is known.
+    return winding != 0 if tables.shapes[shape, _IS_SOLID] == _ORIENTED else winding % 2 != 0
 
 
 @compiled

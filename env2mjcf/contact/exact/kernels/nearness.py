@@ -16,7 +16,9 @@ _ROOT = 0
 
 
 @compiled
-def distance(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, bound: float, room: Room) -> float:
+def distance(
+    tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, bound: float, enough: float, room: Room
+) -> float:
     """Return the squared distance of shapes s and t at world poses, (12,), or the bound where that is less.
 
     Args:
@@ -24,22 +26,23 @@ def distance(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, bound: fl
         s, t: Shapes that do not touch.
         pose_s, pose_t: Their poses.
         bound: What is farther does not matter; squared.
+        enough: Where something is nearer than this, how near does not matter; squared.
         room: To work in.
     """
     m = relative(pose_s, pose_t)
     if box_gap(m, tables.halves[s], tables.halves[t]) >= bound:
         return bound
-    return _search(tables, s, t, m, bound, room)
+    return _search(tables, s, t, m, bound, enough, room)
 
 
 @compiled
-def _search(tables: Tables, s: int, t: int, m: Pose, bound: float, room: Room) -> float:
+def _search(tables: Tables, s: int, t: int, m: Pose, bound: float, enough: float, room: Room) -> float:
     stack, gaps = room.stack, room.gaps
     back = inverted(m)
     stack[0], stack[1] = tables.shapes[s, _ROOT] * _LANES, tables.shapes[t, _ROOT] * _LANES
     gaps[_LANES] = 0.0
     count = 1
-    while count > 0:
+    while count > 0 and bound >= enough:
         count -= 1
         if gaps[_LANES + count] >= bound:
             continue

@@ -82,7 +82,6 @@ class Room(NamedTuple):
         top: Stack of a walk over obstacles.
         stack: Stack of a walk over meshes.
         gaps: A bound for each place on that stack, behind eight for the lanes of a node.
-        stretches: (64, 2) stack of stretches of a way: each look halves one, and a float has no more halves.
     """
 
     q: Any
@@ -91,7 +90,6 @@ class Room(NamedTuple):
     top: Any
     stack: Any
     gaps: Any
-    stretches: Any
 
 
 @compiled_with_arrays
@@ -104,5 +102,4 @@ def room(tables: Tables) -> Room:
         np.empty(tables.counts[0, 1], dtype=np.int64),
         np.empty(tables.counts[0, 2], dtype=np.int64),
         np.empty(tables.counts[0, 2]),
-        np.empty((64, 2)),
     )

@@ -25,26 +25,26 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
     first, second = tables.shapes[s], tables.shapes[t]
     if first[_IS_BOX] == 1 and second[_IS_BOX] == 1:
         # The boxes are the bodies.
-        return (first[_IS_SOLID] == 1 or not _box_in_box(m, a, b)) and (
-            second[_IS_SOLID] == 1 or not _box_in_box(inverted(m), b, a)
+        return (first[_IS_SOLID] > 0 or not _box_in_box(m, a, b)) and (
+            second[_IS_SOLID] > 0 or not _box_in_box(inverted(m), b, a)
         )
     if first[_IS_BOX] == 1 and _counts_as_solid(first, a, b):
-        crosses = _box_crosses(tables, a, t, m, stack)
+        crosses = box_crosses(tables, a, 0.0, t, m, stack)
     elif second[_IS_BOX] == 1 and _counts_as_solid(second, b, a):
-        crosses = _box_crosses(tables, b, s, inverted(m), stack)
+        crosses = box_crosses(tables, b, 0.0, s, inverted(m), stack)
     else:
         crosses = _trees_cross(tables, s, t, m, stack)
     if crosses:
         return True
-    return (second[_IS_SOLID] == 1 and _holds_any(tables, t, s, inverted(m), stack)) or (
-        first[_IS_SOLID] == 1 and _holds_any(tables, s, t, m, stack)
+    return (second[_IS_SOLID] > 0 and _holds_any(tables, t, s, inverted(m), stack)) or (
+        first[_IS_SOLID] > 0 and _holds_any(tables, s, t, m, stack)
     )
 
 
 @compiled
 def _counts_as_solid(shape: Any, half: Any, other: Any) -> bool:
     """Return whether a triangle in a box means contact: it is solid, or no component of the other fits into it."""
-    return shape[_IS_SOLID] == 1 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
+    return shape[_IS_SOLID] > 0 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
 
 
 @compiled
@@ -58,9 +58,9 @@ def _box_in_box(m: Pose, a: Any, b: Any) -> bool:
 
 
 @compiled
-def _box_crosses(tables: Tables, half: Any, t: int, m: Pose, stack: Any) -> bool:
-    """Return whether a solid box meets any triangle of shape t, at pose m in the box's frame."""
-    h0, h1, h2 = half[0], half[1], half[2]
+def box_crosses(tables: Tables, half: Any, grown: float, t: int, m: Pose, stack: Any) -> bool:
+    """Return whether a solid box, grown on all sides, meets any triangle of shape t, at pose m in the box's frame."""
+    h0, h1, h2 = half[0] + grown, half[1] + grown, half[2] + grown
     stack[0] = tables.shapes[t, _START]
     count = 1
     while count > 0:

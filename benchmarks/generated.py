@@ -1,0 +1,155 @@
+"""Write scenes of boxes, snakes and arms, the same at every run: meshes and env files of dialect D."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from table import Case
+
+Points = np.ndarray
+
+# Of all scenes; each adds a number of its own.
+SEED = 20240229
+# Edge of the space in which 50 boxes lie; more boxes lie in more space, so that only their number differs.
+SIDE_OF_50 = 13.0
+# Distance between the middles of two copies of the maze, a little more than its boundary is wide.
+MAZE_TILE = (78.0, 71.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """An obstacle: a mesh file, a position, and three angles in degrees, as an env file gives them."""
+
+    mesh: str
+    position: Sequence[float]
+    angles: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+def cube_among_boxes(folder: Path, boxes: int) -> Case:
+    """Return a free cube among random boxes of one density."""
+    side = SIDE_OF_50 * (boxes / 50) ** (1 / 3)
+    _write_mesh(folder / "cube.g", trimesh.creation.box((1.0, 1.0, 1.0)))
+    robot = ["1", "cube.g Volumetric Rotational", "Connections", "0"]
+    return _scene(folder, f"boxes{boxes}", side, robot, _boxes(folder, boxes, side, boxes))
+
+
+def snake_among_boxes(folder: Path, links: int = 64, boxes: int = 50) -> Case:
+    """Return a chain of boxes with a free base, whose hinges turn about y and z by turns."""
+    side, length = 24.0, 0.5
+    # The hinge is at the end of one link and the beginning of the next; gaps keep the neighbours of neighbours apart.
+    _write_mesh(folder / "segment.g", trimesh.creation.box((0.8 * length, 0.2, 0.2)))
+    robot = [str(links), "segment.g Volumetric Rotational", *["segment.g Joint"] * (links - 1), "Connections"]
+    robot.append(str(links - 1))
+    for i in range(links - 1):
+        turn = 90 if i % 2 else 0
+        # A fifth of a turn at most to either side: a chain of whole turns is a ball that always touches itself.
+        robot += [
+            f"{i} {i + 1} Revolute -0.4:0.4",
+            f"{length / 2} 0 0 {turn} 0 0   0 0 0 0   {length / 2} 0 0 {-turn} 0 0",
+        ]
+    return _scene(folder, "snake64", side, robot, _boxes(folder, boxes, side, 64))
+
+
+def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
+    """Return an arm of seven round links of about 500 triangles on a fixed base, among boxes and balls."""
+    length, radius = 0.5, 0.09
+    capsule = trimesh.creation.capsule(height=length - 2 * radius - 0.06, radius=radius, count=(18, 16))
+    capsule.apply_translation(-capsule.centroid)
+    _write_mesh(folder / "link.g", capsule)
+    _write_mesh(folder / "base.g", trimesh.creation.box((0.3, 0.3, 0.2)))
+    robot = ["8", "base.g Fixed 0 0 0 0 0 0", *["link.g Joint"] * 7, "Connections", "7"]
+    # The links stand along z; hinges are about z for the first one, then about x and y by turns.
+    robot += ["0 1 Revolute -1:1", f"0 0 0.12 0 0 0   0 0 0 0   0 0 {length / 2} 0 0 0"]
+    for i in range(1, 7):
+        angles = ("0 90 0", "0 -90 0") if i % 2 else ("90 0 0", "-90 0 0")
+        robot += [
+            f"{i} {i + 1} Revolute -0.8:0.8",
+            f"0 0 {length / 2} {angles[0]}   0 0 0 0   {_turned(angles[0], length / 2)} {angles[1]}",
+        ]
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.25)
+    _write_mesh(folder / "ball.g", ball)
+    rng = np.random.default_rng(SEED + 7)
+    placed = []
+    for i in range(obstacles):
+        direction = rng.normal(size=3)
+        direction[2] = abs(direction[2])
+        position = direction / np.linalg.norm(direction) * rng.uniform(1.2, 3.2)
+        if i % 2:
+            placed.append(Placed("ball.g", position))
+        else:
+            name = f"block{i}.g"
+            _write_mesh(folder / name, trimesh.creation.box(rng.uniform(0.2, 0.6, 3)))
+            placed.append(Placed(name, position, rng.uniform(-180, 180, 3)))
+    return _scene(folder, "arm7", 9.0, robot, placed)
+
+
+def maze_copies(folder: Path, maze: Case, copies: int) -> Case:
+    """Return the maze with its walls once, 4 or 16 times, side by side; its meshes stay where they are."""
+    lines = maze.path.read_text(encoding="utf-8").splitlines()
+    # Colours are of no use here, and hold spaces.
+    walls = [re.sub(r"-c\(.*?\)", "", line).split() for line in lines if line.startswith("block")]
+    edge = round(copies**0.5)
+    text = [*_boundary_of_tiles(edge), "", "Multibodies", str(len(walls) * copies), ""]
+    for x, y in tile_offsets(copies):
+        for mesh, px, py, *rest in walls:
+            text += ["Passive", " ".join([mesh, str(float(px) + x), str(float(py) + y), *rest]), ""]
+    path = folder / f"maze{copies}.env"
+    path.write_text("\n".join(text), encoding="utf-8")
+    options: dict[str, Any] = {"robots": maze.options["robots"], "mesh_dirs": [maze.path.parent], "allow_outside": True}
+    return Case(f"maze{copies}", path, options)
+
+
+def tile_offsets(copies: int) -> Points:
+    """Return by how much each copy of the maze is moved, (copies, 2); the first ones surround the origin."""
+    edge = round(copies**0.5)
+    x, y = np.meshgrid(np.arange(edge), np.arange(edge), indexing="ij")
+    return np.stack([x.ravel(), y.ravel()], axis=1) * MAZE_TILE
+
+
+def _boundary_of_tiles(edge: int) -> list[str]:
+    x, y = ((edge - 1) * t for t in MAZE_TILE)
+    return [f"Boundary Box2D [-38.5:{38.8 + x} ; -35:{35 + y}]"]
+
+
+def _boxes(folder: Path, count: int, side: float, seed: int) -> Iterable[Placed]:
+    """Yield boxes of ten shapes, placed and turned at random in a cube."""
+    rng = np.random.default_rng(SEED + seed)
+    shapes = min(count, 10)
+    for i in range(shapes):
+        _write_mesh(folder / f"box{i}.g", trimesh.creation.box(rng.uniform(0.5, 2.0, 3)))
+    for i in range(count):
+        position, angles = rng.uniform(-side / 2, side / 2, 3), rng.uniform(-180, 180, 3)
+        yield Placed(f"box{i % shapes}.g", position, angles)
+
+
+def _turned(angles: str, z: float) -> str:
+    """Return the vector (0, 0, z) in a frame turned by one right angle, about x or y."""
+    about_x, about_y, _ = (float(a) for a in angles.split())
+    return f"0 {z if about_x else 0} {z if not about_x and not about_y else 0}" if not about_y else f"{-z} 0 0"
+
+
+def _scene(folder: Path, name: str, side: float, robot: Sequence[str], obstacles: Iterable[Placed]) -> Case:
+    placed = list(obstacles)
+    bounds = " ; ".join([f"{-side / 2!r}:{side / 2!r}"] * 3)
+    lines = [f"Boundary Box [{bounds}]", "", "Multibodies", str(1 + len(placed)), "", "Active", *robot, ""]
+    for thing in placed:
+        numbers = " ".join(repr(float(x)) for x in (*thing.position, *thing.angles))
+        lines += ["Passive", f"{thing.mesh} {numbers}", ""]
+    path = folder / f"{name}.env"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return Case(name, path)
+
+
+def _write_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Write a mesh as BYU text."""
+    vertices, faces = mesh.vertices, mesh.faces + 1
+    lines = [f"1 {len(vertices)} {len(faces)} {faces.size}", f"1 {len(faces)}"]
+    lines += [" ".join(repr(float(x)) for x in v) for v in vertices]
+    lines += [f"{a} {b} {-c}" for a, b, c in faces]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

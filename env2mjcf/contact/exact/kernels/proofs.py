@@ -1,0 +1,182 @@
+"""Proofs that bodies stay apart on a straight way.
+
+Bodies that are d apart and come nearer by at most v a unit of time do not meet within d / v (conservative advancement:
+Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, 1996). A look at the middle of a stretch of the way
+clears the pairs that are farther apart than they can come nearer; for the others the stretch is halved.
+
+What is apart at one time must touch before it crosses, edge to edge or corner to face, and before it gets inside. So
+it is enough that these distances, of edges and of corners, are nowhere too small: no look asks for crossings.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .boxes import boxes_apart, lanes_about
+from .compiling import compiled
+from .edges import collides_at, place_at
+from .nearness import distance
+from .opening import Room, Tables
+from .poses import Pose, inverted, relative
+from .separations import box_gap
+from .touching import box_crosses
+
+_LANES = 8
+_STEP, _SHAPE, _TOP = 0, 1, 2
+_IS_BOX = 2
+_CLEAR, _OPEN, _TOO_NEAR = 0, 1, 2
+
+LEVELS = 40
+"""How often a stretch is halved at the most."""
+
+
+@compiled
+def edge_is_free(
+    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float,
+    stretches: Any, runs: Any, pending: Any,
+) -> bool:  # fmt: skip
+    """Return whether bodies provably stay apart on the way from `start` by `delta`.
+
+    Args:
+        tables: The scene.
+        room: To work in.
+        start, delta: (dim,).
+        speeds, pair_speeds: (l,) and (p,) bounds of how much nearer bodies come on the whole way.
+        band: Bodies as near as this may touch.
+        stretches, runs: (2 LEVELS, 2) a stack of stretches, and of the pairs that are open on each: first and last.
+        pending: Those pairs: link * obstacles + obstacle, or ~pair of links. Halves share the list of the whole.
+    """
+    # Most ways that hit do so at one of these. The last look leaves the robots in the middle of the way.
+    for i in range(5):
+        if collides_at(tables, room, start, delta, (3 * i % 5) / 4):
+            return False
+    fastest = 0.0
+    for i in range(len(speeds)):
+        fastest = max(fastest, speeds[i])
+    for i in range(len(pair_speeds)):
+        fastest = max(fastest, pair_speeds[i])
+    if fastest == 0.0:
+        return True
+    # Distances are shortened by what bodies move in this time, which is the band for the fastest.
+    margin = band / fastest
+    stretches[0, 0], stretches[0, 1] = 0.0, 1.0
+    runs[0, 0], runs[0, 1] = 0, _gather(tables, room, speeds, pair_speeds, 0.5 + margin, pending)
+    count = 1
+    while count > 0:
+        count -= 1
+        low, high = stretches[count, 0], stretches[count, 1]
+        first, last = runs[count, 0], runs[count, 1]
+        middle, half = (low + high) / 2, (high - low) / 2
+        place_at(tables, room, start, delta, middle)
+        left = last
+        for i in range(first, last):
+            speed = _speed(tables, speeds, pair_speeds, pending[i])
+            state = _look(tables, room, pending[i], speed, half, margin)
+            if state == _TOO_NEAR:
+                return False
+            if state == _OPEN:
+                pending[left] = pending[i]
+                left += 1
+        if left == last:
+            continue
+        if count + 2 > len(stretches):
+            return False
+        stretches[count, 0], stretches[count, 1] = middle, high
+        stretches[count + 1, 0], stretches[count + 1, 1] = low, middle
+        for i in range(count, count + 2):
+            runs[i, 0], runs[i, 1] = last, left
+        count += 2
+    return True
+
+
+@compiled
+def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: float, pending: Any) -> int:
+    """List the pairs whose boxes may meet within a time, and return how many they are."""
+    count = 0
+    spans, frames, stack = room.spans, room.frames, room.top
+    for link in range(len(tables.links)):
+        if tables.links[link, _TOP] < 0 or speeds[link] == 0:
+            continue
+        pose, span, reach = frames[tables.links[link, _STEP]], spans[link], speeds[link] * time
+        stack[0] = tables.links[link, _TOP]
+        height = 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            lanes = lanes_about(
+                tables.top_boxes[node], pose[3], pose[7], pose[11], span[0] + reach, span[1] + reach, span[2] + reach
+            )
+            for k in range(_LANES):
+                if lanes >> k & 1:
+                    child = tables.top_children[node, k]
+                    if child >= 0:
+                        stack[height] = child
+                        height += 1
+                    else:
+                        pending[count] = link * len(tables.obstacles) + ~child
+                        count += 1
+    for i in range(len(tables.pairs)):
+        a, b, reach = tables.pairs[i, 0], tables.pairs[i, 1], pair_speeds[i] * time
+        p, q = frames[tables.links[a, _STEP]], frames[tables.links[b, _STEP]]
+        if reach > 0 and (
+            abs(p[3] - q[3]) <= spans[a, 0] + spans[b, 0] + reach
+            and abs(p[7] - q[7]) <= spans[a, 1] + spans[b, 1] + reach
+            and abs(p[11] - q[11]) <= spans[a, 2] + spans[b, 2] + reach
+        ):
+            pending[count] = ~i
+            count += 1
+    return count
+
+
+@compiled
+def _speed(tables: Tables, speeds: Any, pair_speeds: Any, code: int) -> float:
+    return pair_speeds[~code] if code < 0 else speeds[code // len(tables.obstacles)]
+
+
+@compiled
+def _look(tables: Tables, room: Room, code: int, speed: float, half: float, margin: float) -> int:
+    """Return what is known of a pair on a stretch of some half length, with the robots placed in its middle."""
+    if code < 0:
+        a, b = tables.links[tables.pairs[~code, 0]], tables.links[tables.pairs[~code, 1]]
+        return _look_at(
+            tables, room, a[_SHAPE], room.frames[a[_STEP]], b[_SHAPE], room.frames[b[_STEP]], speed, half, margin
+        )
+    link, obstacle = tables.links[code // len(tables.obstacles)], code % len(tables.obstacles)
+    pose, other = room.frames[link[_STEP]], tables.poses[obstacle]
+    return _look_at(tables, room, link[_SHAPE], pose, tables.obstacles[obstacle, 0], other, speed, half, margin)
+
+
+@compiled
+def _look_at(
+    tables: Tables, room: Room, s: int, pose_s: Any, t: int, pose_t: Any, speed: float, half: float, margin: float
+) -> int:
+    reach = speed * (half + margin)
+    m = relative(pose_s, pose_t)
+    gap = box_gap(m, tables.halves[s], tables.halves[t])
+    if gap >= reach * reach:
+        return _CLEAR
+    # Halving the stretch is quicker than measuring, unless it would be for nothing.
+    fine = half <= 4 * margin
+    if not fine and 16 * gap >= reach * reach:
+        return _OPEN
+    if not fine and (tables.shapes[s, _IS_BOX] == 1 or tables.shapes[t, _IS_BOX] == 1):
+        # A box grown by the reach holds all that is as near as that.
+        if not _box_within(tables, s, t, m, reach, room.stack):
+            return _CLEAR
+        return _TOO_NEAR if _box_within(tables, s, t, m, 0.0, room.stack) else _OPEN
+    # While there is much to be halved, it is enough to know that something is near.
+    apart = distance(tables, s, pose_s, t, pose_t, reach * reach, 0.0 if fine else reach * reach, room)
+    if apart >= reach * reach:
+        return _CLEAR
+    return _TOO_NEAR if half <= margin or apart <= (speed * margin) ** 2 else _OPEN
+
+
+@compiled
+def _box_within(tables: Tables, s: int, t: int, m: Pose, reach: float, stack: Any) -> bool:
+    """Return whether one of two shapes that is a box, grown by a reach, meets the other; t is at pose m in s."""
+    a, b = tables.halves[s], tables.halves[t]
+    if tables.shapes[s, _IS_BOX] == 0:
+        return box_crosses(tables, b, reach, s, inverted(m), stack)
+    if tables.shapes[t, _IS_BOX] == 0:
+        return box_crosses(tables, a, reach, t, m, stack)
+    return not boxes_apart(m, a[0] + reach, a[1] + reach, a[2] + reach, b[0], b[1], b[2])

@@ -1,0 +1,106 @@
+"""Large polygons with a thin spot: cut, so that only what lies over the spot is thin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..topology import Floats
+from .flat import FlatPolygon, hull_normals
+from .thickness import Surroundings, fit, within
+from .walls import Group, group_of
+
+THIN = 0.25
+"""Depth in units of the greatest one below which a cell is worth cutting."""
+
+_SPOT = 8.0
+"""What counts as a thin spot: where other faces are less deep than this many times the cell."""
+
+_LEAST_SHARE = 0.1
+"""Least area beside the spot, in units of the polygon's, that is worth a cell of its own."""
+
+_CUTS = 4
+_ROUNDS = 3
+
+
+def split_thin(group: Group, wanted: Floats, around: Surroundings, cap: float) -> list[tuple[int, list[Group]]]:
+    """Cut the polygons of thin cells.
+
+    Args:
+        group: Fitted cells.
+        wanted: (g, k) how their sides leaned before.
+        around: What may reach into cells.
+        cap: Greatest height of a cell.
+
+    Returns:
+        Row and fitted parts, groups of one, of each polygon of which most is at least twice as thick thereby.
+    """
+    out: list[tuple[int, list[Group]]] = []
+    for row in np.flatnonzero(_worth_cutting(group, cap)).tolist():
+        before = float(group.depth()[row])
+        corners = group.corners[row] + group.centers[row]
+        parts = list(_parts(group, row, corners, wanted[row], around, cap, _ROUNDS))
+        areas = np.array([_flat(part, 0, part.slopes[0]).area for part in parts])
+        better = np.array([part.depth()[0] >= 2 * before for part in parts])
+        if areas[better].sum() > areas.sum() / 2:
+            out.append((row, parts))
+    return out
+
+
+def _worth_cutting(group: Group, cap: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Tell which cells are thin, and wide enough for parts that are wider than deep, (g,)."""
+    across = np.einsum("gej,gvj->gev", group.inward, group.corners)
+    width = np.ptp(across, axis=2).min(axis=1)
+    depth = group.depth()
+    return np.asarray((depth > 0) & (depth < THIN * cap) & (width > 2 * cap))
+
+
+def _parts(
+    group: Group, row: int, corners: Floats, slopes: Floats, around: Surroundings, cap: float, rounds: int
+) -> Iterator[Group]:
+    """Fit a cell under a part of a polygon, (k, 3) in the mesh's frame; where it is thin, cut the part further."""
+
+    def cell(height: float) -> Group:
+        return group_of(group.members[row : row + 1], corners[None], group.normals[row : row + 1], slopes[None], height)
+
+    fitted = cell(cap)
+    fitted.slopes = fitted.slopes.copy()
+    fit(fitted, around)
+    if rounds == 0 or not _worth_cutting(fitted, cap)[0]:
+        yield fitted
+        return
+    part = _flat(fitted, 0, slopes)
+    spot = within(cell(min(cap, _SPOT * float(fitted.depth()[0]))), around)
+    free, rest = _cut_free(part, part.projected(spot), cap)
+    if not free:
+        yield fitted
+        return
+    for piece in (*free, rest):
+        lifted = piece.points @ part.axes + fitted.centers[0]
+        yield from _parts(group, row, lifted, piece.slopes, around, cap, rounds - 1)
+
+
+def _flat(group: Group, row: int, slopes: Floats) -> FlatPolygon:
+    inward, normal = group.inward[row, 0], group.normals[row]
+    axes = np.stack([np.cross(inward, normal), inward])
+    return FlatPolygon(group.corners[row] @ axes.T, slopes, axes)
+
+
+def _cut_free(part: FlatPolygon, spot: Floats, cap: float) -> tuple[list[FlatPolygon], FlatPolygon]:
+    """Cut off what lies beside a spot (n, 2), along its outline or the polygon's: the largest parts first."""
+    free: list[FlatPolygon] = []
+    least = _LEAST_SHARE * part.area
+    for _ in range(_CUTS):
+        best, border, largest = None, (np.zeros(2), 0.0), least
+        for normal in np.concatenate([hull_normals(spot), part.normals, -part.normals]):
+            offset = float((spot @ normal).max(initial=-np.inf))
+            beside = part.beyond(normal, offset)
+            if beside is not None and beside.area > largest and float(np.ptp(beside.points @ normal)) > cap:
+                best, border, largest = beside, (-normal, -offset), beside.area
+        rest = part.beyond(*border)
+        if best is None or rest is None:
+            break
+        free.append(best)
+        part = rest
+    return free, part

@@ -1,0 +1,219 @@
+"""The compiled parts of the exact engine, each against algebra, MuJoCo, python-fcl or exact arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import trimesh
+from scenes import MODELS
+
+import env2mjcf
+from env2mjcf.contact.exact.motions import Motions
+from env2mjcf.contact.exact.wide_tree import BLOCK, LANES, box_tree, depth, wide_tree
+from env2mjcf.geometry.orientation import winding_numbers
+from env2mjcf.geometry.triangle_distance import nearest
+from env2mjcf.transforms import rotation_matrix, transform
+
+pytest.importorskip("numba")
+
+from env2mjcf.contact.exact.kernels.boxes import boxes_apart, lanes_near
+from env2mjcf.contact.exact.kernels.insides import _LEAN_X, _LEAN_Y, holds
+from env2mjcf.contact.exact.kernels.opening import opened
+from env2mjcf.contact.exact.kernels.separations import triangle_distance, triangle_gap
+from env2mjcf.contact.exact.kernels.triangles import box_meets, triangle_meets
+
+
+def block_of(triangles: np.ndarray) -> np.ndarray:
+    """Triangles (4, 3, 3) as a leaf holds them."""
+    return np.ascontiguousarray(triangles.reshape(BLOCK, 9).T.ravel())
+
+
+def crosses(a: list[list[int]], b: list[list[int]]) -> bool:
+    """Whether triangles with integer corners meet, in rational numbers: an edge of one meets the other one."""
+    return any(
+        meets(p, q, t)
+        for s, t in ((a, b), (b, a))
+        for p, q in ((s[0], s[1]), (s[1], s[2]), (s[2], s[0]))
+    )  # fmt: skip
+
+
+def meets(p: list[int], q: list[int], t: list[list[int]]) -> bool:
+    """Whether a segment meets a triangle in general position."""
+    normal = np.cross(np.subtract(t[1], t[0]), np.subtract(t[2], t[0]))
+    over, under = int(np.dot(normal, np.subtract(p, t[0]))), int(np.dot(normal, np.subtract(q, t[0])))
+    if over * under > 0 or over == under:
+        return False
+    s = Fraction(over, over - under)
+    x = [Fraction(a) + s * (b - a) for a, b in zip(p, q, strict=True)]
+    sides = []
+    for i in range(3):
+        e, w = np.subtract(t[(i + 1) % 3], t[i]).tolist(), [x[k] - t[i][k] for k in range(3)]
+        c = (e[1] * w[2] - e[2] * w[1], e[2] * w[0] - e[0] * w[2], e[0] * w[1] - e[1] * w[0])
+        sides.append(sum(int(n) * k for n, k in zip(normal, c, strict=True)))
+    return all(side >= 0 for side in sides)
+
+
+def test_triangles_meet_as_rational_numbers_say() -> None:
+    rng = np.random.default_rng(1)
+    met = 0
+    for _ in range(1500):
+        a, four = rng.integers(-6, 7, (3, 3)), rng.integers(-6, 7, (4, 3, 3))
+        if any(not np.cross(t[1] - t[0], t[2] - t[0]).any() for t in [a, *four]):
+            continue
+        expected = any(crosses(a.tolist(), b.tolist()) for b in four)
+        # Triangles of one plane have no general position.
+        if any(not (np.cross(a[1] - a[0], a[2] - a[0]) @ (b - a[0]).T).any() for b in four):
+            continue
+        assert triangle_meets(tuple(a.ravel().astype(float)), block_of(four.astype(float))) == expected
+        met += expected
+    assert 300 < met < 1200
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+def test_triangles_of_one_plane_meet_where_they_overlap(axes: tuple[int, ...]) -> None:
+    a = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0]], dtype=float)[:, axes]
+    for shift, expected in (([1, 1, 0], True), ([3, 3, 0], False), ([-5, 0, 0], False), ([2, 1, 0], True)):
+        b = np.tile(a + np.array(shift)[list(axes)], (BLOCK, 1, 1))
+        assert triangle_meets(tuple(a.ravel()), block_of(b)) == expected
+
+
+def test_distances_of_triangles_are_those_of_the_library_of_arrays() -> None:
+    """`nearest` is held against coal elsewhere."""
+    rng = np.random.default_rng(2)
+    for scale in (1e-3, 1.0, 1e3):
+        for _ in range(200):
+            a, four = rng.normal(size=(3, 3)) * scale, rng.normal((2.5, 0, 0), size=(4, 3, 3)) * scale
+            expected = nearest(np.tile(a, (4, 1, 1)), four).distance
+            row, triangle = block_of(four), tuple(a.ravel())
+            if triangle_meets(triangle, row):
+                continue
+            assert np.sqrt(triangle_distance(triangle, row)) == pytest.approx(expected.min(), rel=1e-9)
+            assert triangle_gap(triangle, row) <= expected.min() ** 2 * (1 + 1e-12)
+
+
+def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
+    """Against python-fcl, whose box is solid too."""
+    fcl = pytest.importorskip("fcl")
+    rng = np.random.default_rng(3)
+    half = np.array([0.5, 0.8, 0.3])
+    box = fcl.CollisionObject(fcl.Box(*(2 * half)), fcl.Transform())
+    met = 0
+    for _ in range(600):
+        pose = transform(rotation_matrix(*rng.uniform(-3, 3, 3)), rng.uniform(-1, 1, 3))
+        four = np.tile(rng.normal(size=(1, 3, 3)), (BLOCK, 1, 1))
+        model = fcl.BVHModel()
+        model.beginModel(3, 1)
+        model.addSubModel(four[0], np.array([[0, 1, 2]]))
+        model.endModel()
+        other = fcl.CollisionObject(model, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        expected = fcl.collide(box, other, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+        assert box_meets(block_of(four), tuple(pose[:3].ravel()), *half) == expected
+        met += expected
+    assert 150 < met < 550
+
+
+def test_boxes_are_apart_as_fcl_says_and_lanes_agree() -> None:
+    fcl = pytest.importorskip("fcl")
+    rng = np.random.default_rng(4)
+    a, b = np.array([1.0, 0.4, 0.2]), np.array([0.3, 0.9, 0.5])
+    row = np.zeros(48)
+    row[24:] = -1e150
+    row[[24, 32, 40]] = b
+    first = fcl.CollisionObject(fcl.Box(*(2 * a)), fcl.Transform())
+    for _ in range(1000):
+        pose = transform(rotation_matrix(*rng.uniform(-3, 3, 3)), rng.uniform(-1.6, 1.6, 3))
+        second = fcl.CollisionObject(fcl.Box(*(2 * b)), fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        touching = fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+        m = tuple(pose[:3].ravel())
+        assert boxes_apart(m, *a, *b) is not touching
+        assert lanes_near(row, m, 0.0, 0.0, 0.0, *a) == int(touching)
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 2, np.pi, 1e-9])
+def test_parallel_boxes_that_overlap_are_never_called_apart(angle: float) -> None:
+    """Cross products of parallel sides are all rounding."""
+    rng = np.random.default_rng(5)
+    for _ in range(500):
+        pose = transform(rotation_matrix(0, 0, angle), rng.uniform(-1, 1, 3) * 0.999)
+        assert not boxes_apart(tuple(pose[:3].ravel()), 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
+
+
+def test_trees_hold_every_triangle_once_in_boxes_around_it() -> None:
+    for mesh in (trimesh.creation.icosphere(3), trimesh.creation.box(), trimesh.creation.torus(2, 0.5)):
+        triangles = np.asarray(mesh.triangles)
+        tree = wide_tree(triangles)
+        held = {}
+        for node, lane in np.argwhere(tree.child < 0):
+            block = ~tree.child[node, lane]
+            corners = triangles[tree.faces[block]].reshape(-1, 3)
+            center, half = tree.boxes[node, :3, lane], tree.boxes[node, 3:, lane]
+            assert (np.abs(corners - center) <= half).all()
+            np.testing.assert_array_equal(tree.blocks[block].T.reshape(BLOCK, 3, 3), triangles[tree.faces[block]])
+            held[block] = set(tree.faces[block])
+        assert sorted(f for faces in held.values() for f in faces) == list(range(len(triangles)))
+        for node, lane in np.argwhere(tree.child > 0):
+            inner = tree.child[node, lane]
+            used = tree.boxes[inner, 3] >= 0
+            low = (tree.boxes[inner, :3] - tree.boxes[inner, 3:])[:, used].min(axis=1)
+            high = (tree.boxes[inner, :3] + tree.boxes[inner, 3:])[:, used].max(axis=1)
+            center, half = tree.boxes[node, :3, lane], tree.boxes[node, 3:, lane]
+            assert (low >= center - half - 1e-12).all()
+            assert (high <= center + half + 1e-12).all()
+        assert depth(tree.child) <= 2 + 2 * np.log(len(triangles)) / np.log(LANES)
+
+
+def test_trees_over_equal_boxes_are_not_deep() -> None:
+    low = np.zeros((4096, 3))
+    _, child = box_tree(low, low + 1)
+    assert sorted(~child[child < 0]) == list(range(4096))
+    assert depth(child) <= 6
+
+
+def test_steps_place_links_where_the_kinematics_do() -> None:
+    from env2mjcf.contact.exact.kernels.frames import place
+
+    checked = 0
+    for path in sorted(MODELS.glob("*/*.env")):
+        scene = env2mjcf.load(path, robots=tuple(path.parent.glob("*.robot")))
+        engine = scene._queries._chosen("exact")
+        tables = opened(*engine._tables)
+        frames = np.empty((len(tables.steps), 12))
+        for q in scene.space.sample(20, seed=1):
+            place(tables, q, frames)
+            link = 0
+            for robot, columns in zip(scene.compiled.assembly.robots, scene.space.robot_slices, strict=True):
+                motions = Motions()
+                motions.add(robot.kinematics, 0, [np.eye(4)] * len(robot.links))
+                for pose, part in zip(robot.kinematics.forward(q[columns]), robot.links, strict=True):
+                    step, shape = tables.links[link, :2]
+                    # The step places the frame of the shape's box: its centre is that of the box.
+                    found = frames[step].reshape(3, 4)
+                    box = part.analysis.box
+                    if box is not None:
+                        np.testing.assert_allclose(found[:, 3], pose[:3, :3] @ box.center + pose[:3, 3], atol=1e-12)
+                    half = tables.halves[shape, :3]
+                    corners = part.analysis.vertices @ pose[:3, :3].T + pose[:3, 3]
+                    assert (np.abs((corners - found[:, 3]) @ found[:, :3]) <= half * (1 + 1e-9) + 1e-12).all()
+                    np.testing.assert_allclose(found[:, :3].T @ found[:, :3], np.eye(3), atol=1e-12)
+                    link += 1
+                    checked += 1
+    assert checked > 200
+
+
+def test_rays_count_as_winding_numbers_do() -> None:
+    """Of the bottle, from points all over it, and from points whose rays go through corners of the mesh."""
+    scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env")
+    tables = opened(*scene._queries._chosen("exact")._tables)
+    part, shape = scene.compiled.assembly.obstacles[0], int(tables.obstacles[0, 0])
+    frame = tables.poses[0].reshape(3, 4)
+    vertices = (part.analysis.vertices @ part.pose[:3, :3].T + part.pose[:3, 3] - frame[:, 3]) @ frame[:, :3]
+    rng = np.random.default_rng(6)
+    corners = vertices[rng.integers(len(vertices), size=1500)]
+    below = corners - rng.uniform(0.01, 1, (1500, 1)) * np.array([_LEAN_X, _LEAN_Y, 1.0])
+    points = np.concatenate([rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (1500, 3)), below])
+    expected = np.abs(winding_numbers(points, vertices, part.analysis.faces)) > 0.5
+    stack = np.zeros(4096, dtype=np.int64)
+    assert [holds(tables, shape, *point, stack) for point in points] == expected.tolist()
+    assert 200 < expected.sum() < 2800
