@@ -1,4 +1,4 @@
-"""What can be asked about a scene's configurations and edges, one or a million at a time."""
+"""What can be asked about configurations, one or a million at a time."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from math import isfinite
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..contact.batch import Question, ask
 from ..contact.packed import joined, packed
-from ..contact.paths import check_path
 from ..contact.queries import ContactQueries
-from ..contact.types import Contact, PackedContacts, PathReport
+from ..contact.types import Contact, PackedContacts
 from ..options import Engine
 from ..space import ConfigurationSpace
 from ..transforms import Array
+from .edges import EdgeAnswers
 
 _ENGINES = get_args(Engine)
 _FLOAT = np.dtype(np.float64)
 
 
-class Answers:
+class Answers(EdgeAnswers):
     """The queries of a `Scene`.
 
     Args:
@@ -32,8 +32,7 @@ class Answers:
     """
 
     def __init__(self, queries: ContactQueries, space: ConfigurationSpace) -> None:
-        self._queries = queries
-        self.space: ConfigurationSpace = space
+        super().__init__(queries, space)
         self._one_row = (space.dim,)
 
     def link_poses(self, q: ArrayLike, *, threads: int | None = None) -> Array:
@@ -184,83 +183,6 @@ class Answers:
         ask(self._queries, question, store, threads, executor, progress)
         return joined([parts[start] for start in sorted(parts)])
 
-    # Edges and paths.
-
-    def edge_in_collision(
-        self,
-        q0: ArrayLike,
-        q1: ArrayLike,
-        resolution: float | None = None,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
-    ) -> Any:
-        """Return whether anything touches on the straight way between two configurations, ends included.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-            resolution: Greatest distance in metres that any point of a robot moves between two checks; None takes
-                the file's PositionRes, else 0.01 extent.
-            threads: As for `in_collision`; edges count as rows.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape, or the resolution is not positive.
-        """
-        start, delta = self._way(q0, q1)
-        extras = (self._queries.steps.resolution(resolution),)
-        columns = np.atleast_2d(start), np.atleast_2d(delta)
-        hits = self._rows(ContactQueries.edges_collide, columns, threads, executor, progress, extras)
-        return hits if start.ndim == 2 else hits[0].item()
-
-    def edge_is_free(
-        self,
-        q0: ArrayLike,
-        q1: ArrayLike,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
-    ) -> Any:
-        """Return whether nothing touches anywhere on the straight way between two configurations, proved.
-
-        True is a proof: distances along the way are compared with how far bodies can move (bounded as for
-        `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
-        than 1e-5 of the extent. Joint values in between are not rounded to any step.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-            threads: As for `in_collision`; edges count as rows.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape.
-        """
-        start, delta = self._way(q0, q1)
-        columns = np.atleast_2d(start), np.atleast_2d(delta)
-        free = self._rows(ContactQueries.edges_are_free, columns, threads, executor, progress)
-        return free if start.ndim == 2 else free[0].item()
-
-    def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
-        """Check the validity of a path's configurations and of the straight edges between them.
-
-        Args:
-            path: (k, dim).
-            resolution: As for `edge_in_collision`.
-
-        Raises:
-            ValueError: The path has a wrong shape, or the resolution is not positive.
-        """
-        queries = self._queries
-        return check_path(path, queries.steps, queries.validities, self.contacts, self.space, resolution)
-
-    # What they share.
-
     def _at_once(self, q: ArrayLike) -> Array | None:
         """Return a single good row as (1, dim); None for anything else, which takes the long way.
 
@@ -288,40 +210,3 @@ class Answers:
             function, (np.atleast_2d(rows),), threads, executor, progress, (engine,), row_bytes=row_bytes
         )
         return found if rows.ndim == 2 else found[0].item()
-
-    def _rows(
-        self,
-        function: Callable[..., Any],
-        columns: tuple[Array, ...],
-        threads: int | None,
-        executor: Executor | None,
-        progress: bool,
-        extras: tuple[Any, ...] = (),
-        *,
-        kind: type[np.generic] = np.bool_,
-        shape: tuple[int, ...] | None = None,
-        row_bytes: int | None = None,
-    ) -> NDArray[Any]:
-        """Return one answer for each row, each a `kind`, or an array of floats of this shape."""
-        count = len(columns[0])
-        answers = np.empty((count, *shape) if shape else count, dtype=np.float64 if shape else kind)
-
-        def store(where: slice, some: NDArray[Any]) -> None:
-            answers[where] = some
-
-        question = Question(function, columns, extras, row_bytes or self._queries.row_bytes())
-        ask(self._queries, question, store, threads, executor, progress)
-        return answers
-
-    def _row(self, q: ArrayLike) -> Array:
-        row = self.space.check(q)
-        if row.ndim != 1:
-            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
-        return row
-
-    def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
-        """Return where ways begin, and where they lead from there."""
-        start, end = self.space.check(q0), self.space.check(q1)
-        if start.shape != end.shape:
-            raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
-        return start, self.space.difference(start, end)
