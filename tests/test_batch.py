@@ -230,6 +230,33 @@ def test_a_killed_run_is_resumed_and_every_verdict_right(scene, tmp_path) -> Non
     np.testing.assert_array_equal(np.load("v.npy"), scene.in_collision(q, threads=2))
 
 
+def test_ctrl_c_keeps_what_is_done(scene, tmp_path) -> None:
+    saved(scene, 200_000)
+    program = (
+        "import signal, sys; from env2mjcf.batch import running; from env2mjcf.cli.main import main\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "running._FIRST = 200; running._GROWTH = 1\n"
+        "sys.exit(main(['batch', 'scene.env', 'q.npy', '-o', 'v.npy', '--engine', 'mujoco', '--what', 'clearance']))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    child = subprocess.Popen([sys.executable, "-c", program], env=environment, stderr=subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + 60
+        while not Path("v.npy.journal").exists() and time.monotonic() < deadline:
+            assert child.poll() is None
+            time.sleep(0.01)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=20) == 130
+    finally:
+        child.kill()
+        child.wait()
+    assert left(tmp_path) == {"v.npy.partial", "v.npy.journal"}
+    done = json.loads(Path("v.npy.journal").read_text())["done"]
+    q = np.load("q.npy")[: min(done, 100)]
+    assert 0 < done < 200_000
+    np.testing.assert_array_equal(np.load("v.npy.partial", mmap_mode="r")[: len(q)], scene.clearance(q))
+
+
 class TestProgram:
     def run(self, capsys, *words: str) -> tuple[int, str, str]:
         capsys.readouterr()

@@ -237,7 +237,8 @@ def test_ctrl_c_stops_threads_within_a_second(tmp_path: Path) -> None:
     path = write_scene(tmp_path, free_cube("2 0 0 0 0 0", "-2 0 0 0 0 0"))
     program = textwrap.dedent(
         """
-        import sys, threading, env2mjcf
+        import signal, sys, threading, env2mjcf
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background inherit that it is ignored
         scene = env2mjcf.load(sys.argv[1], engine="mujoco")
         q = scene.space.sample(2_000_000, seed=0)
         scene.in_collision(q[:1000])
