@@ -183,6 +183,21 @@ def test_a_call_is_checked_as_the_options_are(cubes: env2mjcf.Scene) -> None:
         cubes.in_collision(["a"] * 6)
 
 
+@pytest.mark.parametrize("bad", [[np.nan] * 6, [np.inf, 0, 0, 0, 0, 0], [np.inf, -np.inf, 0, 0, 0, 0], [0.0] * 5])
+def test_one_row_is_checked_as_many_are(cubes: env2mjcf.Scene, bad: list[float]) -> None:
+    for row in (bad, np.array(bad), np.array([bad])):
+        for query in (cubes.in_collision, cubes.is_valid):
+            with pytest.raises(ValueError, match="cube.x"):
+                query(row)
+
+
+def test_one_row_of_any_numbers_has_the_same_verdict(cubes: env2mjcf.Scene) -> None:
+    for row in (at(4.5, 0, 0), at(0, 0, 0), at(1e308, 1e308, 0)):
+        verdict = bool(cubes.in_collision(row[None])[0])
+        for same in (row, list(row), row.astype(">f8"), np.repeat(row, 2)[::2]):
+            assert cubes.in_collision(same) is verdict
+
+
 def test_edges_are_checked_between_their_ends(cubes: env2mjcf.Scene) -> None:
     above, below = at(5, 0, 4), at(5, 0, -4)
     assert not cubes.in_collision(np.stack([above, below])).any()
