@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from .boxes import lanes_about
-from .compiling import compiled
+from .compiling import inlined
 from .opening import Room, Tables
 from .touching import touch
 
 _STEP, _SHAPE, _TOP = 0, 1, 2
 
 
-@compiled
+@inlined
 def collides(tables: Tables, room: Room) -> bool:
     """Return whether any tested pair touches, with the robots placed in the room's frames, and measured."""
     frames, spans = room.frames, room.spans
@@ -30,7 +30,7 @@ def collides(tables: Tables, room: Room) -> bool:
     return False
 
 
-@compiled
+@inlined
 def measure(tables: Tables, room: Room) -> None:
     """Fill the room's spans from its frames."""
     for link in range(len(tables.links)):
@@ -41,7 +41,7 @@ def measure(tables: Tables, room: Room) -> None:
             )
 
 
-@compiled
+@inlined
 def _meets_obstacle(tables: Tables, link: int, room: Room) -> bool:
     pose, shape = room.frames[tables.links[link, _STEP]], tables.links[link, _SHAPE]
     span, stack = room.spans[link], room.top
