@@ -160,10 +160,12 @@ class _Obstacles:
             boxes, child = box_tree(self._low[rows], self._high[rows])
             self.stack = max(self.stack, LANES * (depth(child) + 1))
             first = sum(map(len, self._child))
+            # The root has one lane, the whole; walks begin below it, unless that is all there is.
+            start = first + max(int(child[0, 0]), 0)
             leaf = child < 0
             child[leaf] = ~rows[~child[leaf]]
             child[child > 0] += first
-            self._roots[key] = first
+            self._roots[key] = start
             self._boxes.append(boxes)
             self._child.append(child)
         return self._roots[key]

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from .boxes import lanes_about
-from .compiling import compiled
+from .compiling import inlined
 from .opening import Room, Tables
 from .touching import touch
 
-_LANES = 8
 _STEP, _SHAPE, _TOP = 0, 1, 2
 
 
-@compiled
+@inlined
 def collides(tables: Tables, room: Room) -> bool:
     """Return whether any tested pair touches, with the robots placed in the room's frames, and measured."""
     frames, spans = room.frames, room.spans
@@ -31,7 +30,7 @@ def collides(tables: Tables, room: Room) -> bool:
     return False
 
 
-@compiled
+@inlined
 def measure(tables: Tables, room: Room) -> None:
     """Fill the room's spans from its frames."""
     for link in range(len(tables.links)):
@@ -42,7 +41,7 @@ def measure(tables: Tables, room: Room) -> None:
             )
 
 
-@compiled
+@inlined
 def _meets_obstacle(tables: Tables, link: int, room: Room) -> bool:
     pose, shape = room.frames[tables.links[link, _STEP]], tables.links[link, _SHAPE]
     span, stack = room.spans[link], room.top
@@ -52,13 +51,15 @@ def _meets_obstacle(tables: Tables, link: int, room: Room) -> bool:
         count -= 1
         node = stack[count]
         lanes = lanes_about(tables.top_boxes[node], pose[3], pose[7], pose[11], span[0], span[1], span[2])
-        children = tables.top_children[node]
-        for k in range(_LANES):
-            if lanes >> k & 1:
-                child = children[k]
+        k = 0
+        while lanes > 0:
+            if lanes & 1:
+                child = tables.top_children[node, k]
                 if child >= 0:
                     stack[count] = child
                     count += 1
                 elif touch(tables, shape, pose, tables.obstacles[~child, 0], tables.poses[~child], room.stack):
                     return True
+            lanes >>= 1
+            k += 1
     return False

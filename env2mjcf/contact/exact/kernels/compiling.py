@@ -27,6 +27,11 @@ def compiled(function: F) -> F:
     return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False)(function))
 
 
+def inlined(function: F) -> F:
+    """Compile a function as a part of those that call it: handing all tables over takes longer than what it does."""
+    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False, forceinline=True)(function))
+
+
 def compiled_strictly(function: F) -> F:
     """Compile a function whose results must not depend on where it is used: each operation is rounded by itself."""
     return cast(F, _njit(nogil=True, error_model="numpy", _nrt=False)(function))

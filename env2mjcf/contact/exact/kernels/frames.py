@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from ..motions import Motion
-from .compiling import compiled
+from .compiling import compiled, inlined
 from .opening import Tables
 
 _TURN_Z, _TURN_X, _SLIDE_Z, _BASE = int(Motion.TURN_Z), int(Motion.TURN_X), int(Motion.SLIDE_Z), int(Motion.BASE)
 
 
-@compiled
+@inlined
 def place(tables: Tables, q: Any, frames: Any) -> None:
     """Fill frames, (s, 12), with the world poses of all steps at a configuration, (dim,)."""
     for i in range(len(tables.steps)):

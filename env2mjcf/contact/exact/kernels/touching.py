@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .boxes import boxes_apart, lanes_near
-from .compiling import compiled
+from .compiling import compiled, inlined
 from .insides import holds
 from .opening import Tables
 from .poses import Pose, inverted, moved, relative
@@ -15,7 +15,7 @@ _LANES, _BLOCK = 8, 4
 _ROOT, _START, _IS_BOX, _IS_SOLID, _FIRST, _LAST = 0, 1, 2, 3, 4, 5
 
 
-@compiled
+@inlined
 def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) -> bool:
     """Return whether shapes s and t at world poses, (12,), touch."""
     m = relative(pose_s, pose_t)
