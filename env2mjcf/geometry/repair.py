@@ -69,12 +69,13 @@ def _without_folds(mesh: Mesh, result: Repaired) -> Repaired:
     new = unfolded(before) if before.solid and not before.convex else None
     if new is None:
         return result
-    # What the file says about winding is known already: the new faces have none of their own.
+    # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
     after = replace(
         _again(mesh, before, new.faces, new.source),
         consistent=before.consistent,
         inverted=before.inverted,
         signed_volume=before.signed_volume,
+        crowded_edges=before.crowded_edges,
     )
     noise = before.tolerance * before.area
     if not after.solid or len(after.faces) != len(new.faces) or abs(after.volume - before.volume) > noise:
@@ -111,11 +112,11 @@ def repair_diagnostics(
             span=span,
         )  # fmt: skip
     if result.folded_faces:
-        sheets = f"{result.sheets} of them reach beyond the solid and stay as sheets" if result.sheets else ""
+        sheets = f"; {result.sheets} of them reach beyond the solid and stay as sheets" if result.sheets else ""
         log.warn(
             GeometryError, "GEO244", subject or mesh.name,
-            f"flat parts of {result.folded_faces} faces are folded over themselves and were triangulated anew"
-            + (f"; {sheets}" if sheets else ""),
+            f"flat parts of {result.folded_faces} faces in all are folded over themselves: "
+            f"they were triangulated anew{sheets}",
             span=span,
         )  # fmt: skip
     mesh_diagnostics(mesh, result.analysis, log, subject, span)
