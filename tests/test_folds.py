@@ -10,9 +10,11 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import box, channel, corpus_meshes, joined, moved, rotation, turned
+from scenes import box_mesh, free_cube, write_scene
 from test_repair import assert_surface_stays, codes
 from test_solid import assert_inside_and_covering, crossing_prism, height, lined, shelled
 
+import env2mjcf
 from env2mjcf.geometry.analysis import analyse
 from env2mjcf.geometry.folds import unfolded
 from env2mjcf.geometry.mesh import Mesh
@@ -161,6 +163,26 @@ def test_what_is_not_folded_or_not_simple_is_left_alone(mesh: Mesh) -> None:
     assert result.folded_faces == 0
     assert "GEO244" not in codes(mesh)
     np.testing.assert_array_equal(result.analysis.faces, analyse(mesh).faces)
+
+
+def byu(mesh: Mesh) -> str:
+    vertices = "\n".join(" ".join(map(repr, v)) for v in mesh.vertices.tolist())
+    faces = "\n".join(f"{a + 1} {b + 1} {-c - 1}" for a, b, c in mesh.faces.tolist())
+    n = len(mesh.faces)
+    return f"1 {len(mesh.vertices)} {n} {3 * n}\n1 {n}\n{vertices}\n{faces}\n"
+
+
+@pytest.mark.parametrize(("mesh", "touched"), [(channel(), False), (folded_beyond(), True), (folded_within(), False)])
+@pytest.mark.parametrize("collision", ["solid", "surface"])
+def test_verdicts_at_the_sheet(mesh: Mesh, touched: bool, collision: str, tmp_path: Path) -> None:
+    """A cube of 0.1 in the opening, in the plane of the cap, 1e-4 before it, behind it, and in the solid."""
+    scene_file = write_scene(tmp_path, free_cube("cap.g 0 0 0 0 0 0"), cube=box_mesh(0.05, 0.05, 0.05), cap=byu(mesh))
+    scene = env2mjcf.load(scene_file, collision=collision)
+    placed = next(p.mesh for p in scene.compiled.assembly.parts() if p.name == scene.obstacle_names[0])
+    shift = placed.vertices[0] - mesh.vertices[0]
+    places = np.array([[4, 1.9, 1.8], [4.0501, 1.9, 1.8], [3.9499, 1.9, 1.8], [4.0499, 1.5, 0.5]])
+    q = np.column_stack([places + shift, np.zeros((4, 3))])
+    assert [bool(scene.in_collision(row)) for row in q] == [touched, False, False, True]
 
 
 def test_new_faces_lead_to_faces_of_the_same_plane() -> None:
