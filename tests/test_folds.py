@@ -15,6 +15,7 @@ from test_repair import assert_surface_stays, codes
 from test_solid import assert_inside_and_covering, crossing_prism, height, lined, shelled
 
 import env2mjcf
+from env2mjcf.geometry import folds
 from env2mjcf.geometry.analysis import analyse
 from env2mjcf.geometry.folds import unfolded
 from env2mjcf.geometry.mesh import Mesh
@@ -74,7 +75,7 @@ FOLDED = {
 SHEETS = {"beyond": 1, "turned beyond": 1, "two solids": 1}
 
 
-def folds(mesh: Mesh) -> int:
+def edges_folded(mesh: Mesh) -> int:
     """Number of edges with two faces that lie upon each other."""
     a = repaired(mesh).analysis
     tri = trimesh.Trimesh(a.vertices, a.faces, process=False)
@@ -109,7 +110,7 @@ def test_a_fold_within_the_cap_leaves_a_plain_channel(name: str) -> None:
     assert tri.is_winding_consistent
     assert tri.volume == pytest.approx(28, rel=1e-12)
     assert a.area == pytest.approx(analyse(channel()).area, rel=1e-12)
-    assert (len(a.vertices), len(a.faces), a.crowded_edges, folds(mesh)) == (16, 28, 0, 0)
+    assert (len(a.vertices), len(a.faces), a.crowded_edges, edges_folded(mesh)) == (16, 28, 0, 0)
     if name == "within":
         for x in (1e-6, 2, 4 - 1e-6):
             cut = trimesh.intersections.mesh_plane(tri, [1, 0, 0], [x, 0, 0])
@@ -183,6 +184,16 @@ def test_verdicts_at_the_sheet(mesh: Mesh, touched: bool, collision: str, tmp_pa
     places = np.array([[4, 1.9, 1.8], [4.0501, 1.9, 1.8], [3.9499, 1.9, 1.8], [4.0499, 1.5, 0.5]])
     q = np.column_stack([places + shift, np.zeros((4, 3))])
     assert [bool(scene.in_collision(row)) for row in q] == [touched, False, False, True]
+
+
+@pytest.mark.parametrize(("limit", "most", "too_many"), [("_MOST_EDGES", 20, 19), ("_MOST_FACES", 50, 49)])
+def test_what_would_take_too_long_is_left_alone(
+    limit: str, most: int, too_many: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(folds, limit, most)
+    assert unfolded(analyse(crumpled_box(0))) is not None
+    monkeypatch.setattr(folds, limit, too_many)
+    assert unfolded(analyse(crumpled_box(0))) is None
 
 
 def test_new_faces_lead_to_faces_of_the_same_plane() -> None:

@@ -11,8 +11,11 @@ from .planar import triangulated
 from .polygons import PARALLEL
 from .topology import Bools, Edges, Floats, Ints, connected, edges
 
-_MOST_FACES = 400
-"""Faces of a patch beyond which it is left alone: the diagonals that are tried grow with the square."""
+_MOST_FACES = 1000
+"""Faces of a patch beyond which it is left alone."""
+
+_MOST_EDGES = 128
+"""Edges of a patch's outline beyond which it is left alone: that many take about a second, twice as many eight."""
 
 _UNCOVERED = 1e-12
 """Area in units of the squared diagonal that counts as nothing: a spot a millionth of the diagonal across."""
@@ -105,7 +108,9 @@ def _rebuilt(analysis: Analysis, patch: Ints, normal: Floats) -> tuple[Ints, Int
         return None
     flat = points @ _axes(normal).T
     boundary = _outline(local)
-    triangles = None if boundary is None else triangulated(flat, boundary, analysis.tolerance)
+    if boundary is None or len(boundary) > _MOST_EDGES:
+        return None
+    triangles = triangulated(flat, boundary, analysis.tolerance)
     if triangles is None:
         return None
     doubled_areas = _doubled_areas(flat[local])
