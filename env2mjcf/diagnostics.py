@@ -124,6 +124,7 @@ CATALOGUE: dict[str, str] = {
     "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
     "GEO242": "Vertices lay on edges of other faces (T-junctions); those faces were cut there.",
     "GEO243": "A mesh without inside collides as a surface, though it was to be solid.",
+    "GEO244": "Flat parts of a closed mesh were folded over themselves; they were triangulated anew.",
     "GEO250": "The inertia of a body was not computed from its volume alone.",
     "GEO251": "A scene is so large or small that its unit is hardly the metre.",
     "GEO260": "An entry of the geometry cache was damaged and has been made anew.",

@@ -244,7 +244,7 @@ def test_cells_of_real_meshes_stay_inside_and_cover_the_surface(corpus: Path, na
     if shape.analysis.convex:
         assert len(shape.pieces) == 1
         return
-    # The caps of this one are folded over themselves.
+    # Folds of this one's caps reach beyond the solid: two sheets with two sides.
     assert_inside_and_covering(mesh, pinned=4 if name == "S2Dharder1.obj" else 0)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from .topology import Floats, Ints, edges
 
-_PARALLEL = 1.0 - 1e-12
+PARALLEL = 1.0 - 1e-12
+"""Cosine of the angle from which on two normals are one."""
 
 # How far reflex a corner may be, in units of the tolerance: rounding only, since many in a row add up.
 _STRAIGHT = 1e-3
@@ -62,7 +63,7 @@ def _candidates(vertices: Floats, faces: Ints, areas: Floats, tolerance: float) 
     here, there = order[twice], order[twice + 1]
     left, right = here // 3, there // 3
     normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    parallel = np.einsum("ij,ij->i", normals[left], normals[right]) > _PARALLEL
+    parallel = np.einsum("ij,ij->i", normals[left], normals[right]) > PARALLEL
     apart = vertices[faces[right, (there + 2) % 3]] - vertices[faces[left, here % 3]]
     level = np.abs(np.einsum("ij,ij->i", normals[left], apart)) <= tolerance
     chosen = np.flatnonzero(parallel & level)

@@ -1,4 +1,4 @@
-"""Closes what only seems open, without moving the surface: edges that end in the middle of other edges are cut."""
+"""Repairs surfaces without moving them: cuts edges in whose middle others end, and unfolds flat parts."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from .analysis import Analysis, analyse, mesh_diagnostics
+from .folds import unfolded
 from .mesh import Mesh
 from .topology import Floats, Ints, edges
 
@@ -20,21 +21,33 @@ _PASSES = 10
 class Repaired:
     """A mesh as the later stages take it.
 
-    Welding, dropping of copies and turning of faces are part of the analysis; only cuts are added here.
+    Welding, dropping of copies and turning of faces are part of the analysis; cuts and unfolding are added here.
 
     Attributes:
-        analysis: Of the repaired surface; `source` still leads to the faces of the file.
+        analysis: Of the repaired surface; `source` still leads to the faces of the file, from an unfolded part to one
+            near by in that part.
         cut_faces: Faces of the file that were cut, because vertices lie on their edges (T-junctions).
         left_open: Edges of the file's surface that border an odd number of faces, before cutting.
+        folded_faces: Faces in flat parts that were folded over themselves and are triangulated anew.
+        sheets: Of those the ones that reach beyond the solid, and stay as sheets with two sides.
     """
 
     analysis: Analysis
     cut_faces: int = 0
     left_open: int = 0
+    folded_faces: int = 0
+    sheets: int = 0
 
 
 def repaired(mesh: Mesh) -> Repaired:
-    """Analyse a mesh; where open edges run along each other with different vertices, cut the faces there."""
+    """Analyse a mesh; where open edges run along each other with different vertices, cut the faces there.
+
+    Then unfold what is folded, if the surface is that of a solid.
+    """
+    return _without_folds(mesh, _without_t_junctions(mesh))
+
+
+def _without_t_junctions(mesh: Mesh) -> Repaired:
     before = analyse(mesh)
     open_before = _open_edges(before.faces)
     if before.dimension < 3 or not open_before:
@@ -46,15 +59,40 @@ def repaired(mesh: Mesh) -> Repaired:
             break
     if _open_edges(faces) >= open_before:
         return Repaired(before)
+    after = _again(mesh, before, faces, source)
+    return Repaired(after, int((np.bincount(source) > 1).sum()), open_before)
+
+
+def _without_folds(mesh: Mesh, result: Repaired) -> Repaired:
+    before = result.analysis
+    # A convex mesh collides as its hull, whatever its faces are.
+    new = unfolded(before) if before.solid and not before.convex else None
+    if new is None:
+        return result
+    # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
+    after = replace(
+        _again(mesh, before, new.faces, new.source),
+        consistent=before.consistent,
+        inverted=before.inverted,
+        signed_volume=before.signed_volume,
+        crowded_edges=before.crowded_edges,
+    )
+    noise = before.tolerance * before.area
+    if not after.solid or len(after.faces) != len(new.faces) or abs(after.volume - before.volume) > noise:
+        return result
+    return replace(result, analysis=after, folded_faces=new.rebuilt, sheets=new.sheets)
+
+
+def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints) -> Analysis:
+    """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up."""
     after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path))
-    merged = replace(
+    return replace(
         after,
         source=before.source[source[after.source]],
         degenerate_faces=before.degenerate_faces + after.degenerate_faces,
         duplicate_faces=before.duplicate_faces + after.duplicate_faces,
         unused_vertices=before.unused_vertices,
     )
-    return Repaired(merged, int((np.bincount(source) > 1).sum()), open_before)
 
 
 def repair_diagnostics(
@@ -71,6 +109,14 @@ def repair_diagnostics(
             GeometryError, "GEO242", subject or mesh.name,
             f"{result.left_open} open edges, because vertices lie in the middle of other edges (T-junctions); "
             f"{result.cut_faces} faces were cut there, and {outcome}",
+            span=span,
+        )  # fmt: skip
+    if result.folded_faces:
+        sheets = f"; {result.sheets} of them reach beyond the solid and stay as sheets" if result.sheets else ""
+        log.warn(
+            GeometryError, "GEO244", subject or mesh.name,
+            f"flat parts of {result.folded_faces} faces in all are folded over themselves: "
+            f"they were triangulated anew{sheets}",
             span=span,
         )  # fmt: skip
     mesh_diagnostics(mesh, result.analysis, log, subject, span)
