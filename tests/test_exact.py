@@ -146,6 +146,11 @@ class TestClearance:
         # Depths are searched for in numpy, which takes its time.
         assert (model.clearance(q[hits][:6]) <= 0).all()
 
+    def test_of_a_row_does_not_depend_on_the_others(self, model: env2mjcf.Scene) -> None:
+        q = rows(model, 40, 17)
+        q = q[np.argsort(~model.in_collision(q), kind="stable")][:6]
+        assert model.clearance(q).tolist() == [model.clearance(row) for row in q]
+
     def test_is_that_of_the_arrays(self, model: env2mjcf.Scene) -> None:
         """The numpy search, which answers where numba is not installed."""
         q = rows(model, 60, 9)
@@ -194,6 +199,12 @@ class TestEdges:
         compiled = model.edge_is_free(q0, q1)
         monkeypatch.setattr(model._queries, "_default", "mujoco")
         assert compiled.tolist() == model.edge_is_free(q0, q1).tolist()
+
+    def test_are_none_if_there_are_none(self) -> None:
+        for name in ("gantry/gantry", "maze/maze"):
+            scene = load(name)
+            none = np.zeros((0, scene.space.dim))
+            assert scene.edge_is_free(none, none).shape == scene.edge_in_collision(none, none).shape == (0,)
 
     def test_past_a_thin_wall_are_not_certified(self, tmp_path: Path) -> None:
         """A wall that any fixed step would jump over, and one just beside the way."""

@@ -187,7 +187,7 @@ def test_a_call_is_checked_as_the_options_are(cubes: env2mjcf.Scene) -> None:
 def test_one_row_is_checked_as_many_are(cubes: env2mjcf.Scene, bad: list[float]) -> None:
     for row in (bad, np.array(bad), np.array([bad])):
         for query in (cubes.in_collision, cubes.is_valid):
-            with pytest.raises(ValueError, match="cube.x"):
+            with pytest.raises(ValueError, match=r"cube\.x"):
                 query(row)
 
 

@@ -60,8 +60,10 @@ class MotionBounds:
             return turns @ chosen(self._fixed)
         # How far a slide reaches out depends on the way.
         farthest = np.maximum(np.abs(start), np.abs(start + delta))
-        rows = [turn @ chosen(self._levers(far)) for turn, far in zip(turns, farthest, strict=True)]
-        return np.array(rows).reshape(len(start), -1)
+        out = np.empty((len(start), chosen(np.zeros(self._shape)).shape[1]))
+        for i, (turn, far) in enumerate(zip(turns, farthest, strict=True)):
+            out[i] = turn @ chosen(self._levers(far))
+        return out
 
     def _between(self, levers: Array) -> Array:
         first, second = levers[:, self._first], levers[:, self._second]
