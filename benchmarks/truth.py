@@ -1,6 +1,6 @@
-"""Compare verdicts with exact triangles: `python benchmarks/truth.py [--quick] [--scenes NAME ...]`.
+"""Compare verdicts with exact triangles: `python benchmarks/truth.py [--engine ENGINE] [--quick] [--scenes NAME ...]`.
 
-Writes `benchmarks/truth.md`: for every complete scene of the folder that ENV2MJCF_CORPUS names, verdicts of
+Writes `benchmarks/truth.md` (of MuJoCo's engine) or `benchmarks/truth-exact.md` (of the exact one): for every complete scene of the folder that ENV2MJCF_CORPUS names, verdicts of
 `collision="auto"` against triangles and containment, and of `collision="surface"` against triangles alone.
 """
 
@@ -22,10 +22,11 @@ import env2mjcf
 # Other benchmarks take these from here.
 __all__ = ["BAND", "Truth", "main", "visited"]
 
-OUTPUT = Path(__file__).with_name("truth.md")
+OUTPUT = {"mujoco": Path(__file__).with_name("truth.md"), "exact": Path(__file__).with_name("truth-exact.md")}
+HOW = {"mujoco": "by convex cells", "exact": "by triangles, in compiled code"}
 
 
-def text(results: Sequence[Result], command: str, count: int) -> str:
+def text(results: Sequence[Result], command: str, count: int, engine: str) -> str:
     """Return the page."""
     header = ("scene", "uniform", "bisected")
     for mode in MODES:
@@ -61,7 +62,7 @@ def text(results: Sequence[Result], command: str, count: int) -> str:
             'complete scene is loaded with `collision="auto"`, whose verdicts are compared with triangles against '
             'triangles (python-fcl) and containment (crossings of a ray), and with `collision="surface"`, whose '
             "verdicts are compared with the triangles alone; all pairs of `scene.pairs` are tested, with "
-            '`engine="mujoco"`, which is to say by convex cells. Uniform: half of '
+            f'`engine="{engine}"`, which is to say {HOW[engine]}. Uniform: half of '
             "them in the whole space, half with the robot's base about the obstacles. Bisected: every point that "
             f"{HALVINGS} halvings between a free and a colliding configuration visit, onto the borders of both truths.",
             "",
@@ -86,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="few configurations, and write nothing")
     parser.add_argument("--count", type=int, default=8000, help="configurations for each scene")
+    parser.add_argument("--engine", choices=tuple(OUTPUT), default="mujoco")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", nargs="*", help="only these; write nothing")
     parser.add_argument("--processes", type=int, default=2)
@@ -97,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     cases = [c for c in corpus_cases(Path(folder)) if _complete(c) and (not chosen.scenes or c.name in chosen.scenes)]
     done = {}
     with ProcessPoolExecutor(chosen.processes) as pool:
-        futures = [pool.submit(examine, case, count, chosen.seed) for case in cases]
+        futures = [pool.submit(examine, case, count, chosen.seed, chosen.engine) for case in cases]
         for future in as_completed(futures):
             result = future.result()
             done[result.name] = result
@@ -109,11 +111,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 for line in tally.outside[:3]:
                     print("  OUTSIDE", line, flush=True)
     results = [done[c.name] for c in cases]
-    page = text(results, "python benchmarks/truth.py", count)
+    command = "python benchmarks/truth.py" + ("" if chosen.engine == "mujoco" else f" --engine {chosen.engine}")
+    page = text(results, command, count, chosen.engine)
     if chosen.quick or chosen.scenes:
         print(page)
     else:
-        OUTPUT.write_text(page, encoding="utf-8")
+        OUTPUT[chosen.engine].write_text(page, encoding="utf-8")
     return int(any(t.outside for r in results for t in r.tallies.values()))
 
 

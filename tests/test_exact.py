@@ -164,7 +164,8 @@ class TestEdges:
         q0, q1 = rows(model, 60, 10), rows(model, 60, 11)
         q1 = q0 + 0.2 * model.space.difference(q0, q1)
         expected = [
-            model.in_collision(model._steps.rows(a, b, 0.02 * model.extent)).any() for a, b in zip(q0, q1, strict=True)
+            model.in_collision(model._queries.steps.rows(a, b, 0.02 * model.extent)).any()
+            for a, b in zip(q0, q1, strict=True)
         ]
         found = model.edge_in_collision(q0, q1, 0.02 * model.extent)
         assert found.tolist() == expected
