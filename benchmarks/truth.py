@@ -1,7 +1,8 @@
 """Compare verdicts with exact triangles: `python benchmarks/truth.py [--engine ENGINE] [--quick] [--scenes NAME ...]`.
 
-Writes `benchmarks/truth.md` (of MuJoCo's engine) or `benchmarks/truth-exact.md` (of the exact one): for every complete scene of the folder that ENV2MJCF_CORPUS names, verdicts of
-`collision="auto"` against triangles and containment, and of `collision="surface"` against triangles alone.
+Writes `benchmarks/truth.md` (of MuJoCo's engine) or `benchmarks/truth-exact.md` (of the exact one): for every complete
+scene of the folder that ENV2MJCF_CORPUS names, verdicts of `collision="auto"` against triangles and containment, and of
+`collision="surface"` against triangles alone.
 """
 
 from __future__ import annotations

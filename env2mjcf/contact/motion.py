@@ -47,6 +47,26 @@ class MotionBounds:
         """Bound how far any point of each link moves, (n, nlinks), on the ways from (n, dim) by (n, dim)."""
         return self._bound(start, delta, lambda levers: levers)
 
+    def split(self, start: Array, delta: Array) -> tuple[Array, Array]:
+        """Part the motion of links on ways from (n, dim) by (n, dim) in two.
+
+        Returns:
+            The straight translation of each link's base in the world, (n, nlinks, 3); and bounds of how far any point
+            of each link moves besides, (n, nlinks).
+        """
+        drifts = np.zeros((len(start), self._shape[1], 3))
+        rest, link = delta.copy(), 0
+        for robot, columns in zip(self._robots, self._slices, strict=True):
+            # Links of robots with several bases have no translation in common.
+            if len(robot.kinematics.tree.bases) == 1:
+                for i, kind in enumerate(self._kinds[columns]):
+                    if kind in _TRANSLATIONS and robot.kinematics.dofs[i].connection is None:
+                        moved = delta[:, columns.start + i]
+                        drifts[:, link : link + len(robot.links), _TRANSLATIONS.index(kind)] = moved[:, None]
+                        rest[:, columns.start + i] = 0.0
+            link += len(robot.links)
+        return drifts, self.links(start, rest)
+
     def pairs(self, start: Array, delta: Array) -> Array:
         """Bound how much nearer the links of each pair can come to each other, (n, npairs).
 

@@ -145,7 +145,7 @@ class ContactQueries:
         band = _BAND * self._assembly.extent
         exact = self._chosen(None)
         if exact is not None:
-            return exact.edges_are_free(start, delta, links, pairs, band)
+            return exact.edges_are_free(start, delta, links, *self._motion.split(start, delta), pairs, band)
         motion = np.concatenate([links, pairs], axis=1).max(axis=1, initial=0.0)
         ways = zip(start, delta, motion, strict=True)
         return np.array([certified(self._moving_clearances, a, d, m, band) for a, d, m in ways], dtype=bool)

@@ -83,19 +83,23 @@ class ExactEngine:
         self._entries.edges_collide(*self._tables, start, delta, steps, out)
         return out
 
-    def edges_are_free(self, start: Array, delta: Array, speeds: Array, pair_speeds: Array, band: float) -> Bools:
+    def edges_are_free(
+        self, start: Array, delta: Array, speeds: Array, drifts: Array, turns: Array, pair_speeds: Array, band: float
+    ) -> Bools:
         """Return whether bodies provably stay apart on ways from (e, dim) by (e, dim), (e,).
 
         Args:
             start: (e, dim).
             delta: (e, dim).
             speeds: (e, links) bounds of how far each link moves.
+            drifts: (e, links, 3) what of that is a translation with its base.
+            turns: (e, links) bounds of the rest.
             pair_speeds: (e, pairs of links) bounds of how much nearer two links come.
             band: Bodies as near as this may touch.
         """
         out = np.empty(len(start), dtype=np.bool_)
         start, delta = np.ascontiguousarray(start), np.ascontiguousarray(delta)
-        self._entries.edges_are_free(*self._tables, start, delta, speeds, pair_speeds, band, out)
+        self._entries.edges_are_free(*self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
         return out
 
 
@@ -112,5 +116,5 @@ def compile_all() -> float:
     entries.validities(*tables, rows, answers)
     entries.distances(*tables, rows, floats)
     entries.edges_collide(*tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
-    entries.edges_are_free(*tables, rows, rows, rows, rows, 0.0, answers)
+    entries.edges_are_free(*tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start

@@ -59,13 +59,14 @@ def _edges_collide(tables: Tables, room: Room, start: Any, delta: Any, steps: An
 
 @compiled
 def _edges_are_free(
-    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float,
-    stretches: Any, runs: Any, pending: Any, out: Any,
+    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, drifts: Any, turns: Any, pair_speeds: Any,
+    band: float, stretches: Any, runs: Any, pending: Any, out: Any,
 ) -> None:  # fmt: skip
     for i in range(len(start)):
         out[i] = edge_is_free(
-            tables, room, start[i], delta[i], speeds[i], pair_speeds[i], band, stretches, runs, pending
-        )
+            tables, room, start[i], delta[i], speeds[i], drifts[i], turns[i], pair_speeds[i],
+            band, stretches, runs, pending,
+        )  # fmt: skip
 
 
 def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
@@ -95,14 +96,17 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
 
     @entry
     def edges_are_free(
-        integers: Any, floats: Any, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float, out: Any
-    ) -> None:
+        integers: Any, floats: Any, start: Any, delta: Any, speeds: Any, drifts: Any, turns: Any, pair_speeds: Any,
+        band: float, out: Any,
+    ) -> None:  # fmt: skip
         _ = sources
         tables = opened(integers, floats)
         stretches, runs = np.empty((2 * LEVELS, 2)), np.empty((2 * LEVELS, 2), dtype=np.int64)
         # As many lists as levels, each of all pairs at the most.
         pending = np.empty((LEVELS + 1) * (len(tables.links) * len(tables.obstacles) + len(tables.pairs)), np.int64)
-        _edges_are_free(tables, room(tables), start, delta, speeds, pair_speeds, band, stretches, runs, pending, out)
+        _edges_are_free(
+            tables, room(tables), start, delta, speeds, drifts, turns, pair_speeds, band, stretches, runs, pending, out
+        )
 
     return collisions, validities, distances, edges_collide, edges_are_free
 

@@ -17,7 +17,7 @@ from .compiling import compiled
 from .edges import collides_at, place_at
 from .nearness import distance
 from .opening import Room, Tables
-from .poses import Pose, inverted, relative
+from .poses import Pose, Vector, inverted, relative
 from .separations import box_gap
 from .touching import box_crosses
 
@@ -32,8 +32,8 @@ LEVELS = 40
 
 @compiled
 def edge_is_free(
-    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, pair_speeds: Any, band: float,
-    stretches: Any, runs: Any, pending: Any,
+    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, drifts: Any, turns: Any, pair_speeds: Any,
+    band: float, stretches: Any, runs: Any, pending: Any,
 ) -> bool:  # fmt: skip
     """Return whether bodies provably stay apart on the way from `start` by `delta`.
 
@@ -42,6 +42,7 @@ def edge_is_free(
         room: To work in.
         start, delta: (dim,).
         speeds, pair_speeds: (l,) and (p,) bounds of how much nearer bodies come on the whole way.
+        drifts, turns: (l, 3) and (l,) what of the links' motion is one translation, and bounds of the rest.
         band: Bodies as near as this may touch.
         stretches, runs: (2 LEVELS, 2) a stack of stretches, and of the pairs that are open on each: first and last.
         pending: Those pairs: link * obstacles + obstacle, or ~pair of links. Halves share the list of the whole.
@@ -71,7 +72,7 @@ def edge_is_free(
         left = last
         for i in range(first, last):
             speed = _speed(tables, speeds, pair_speeds, pending[i])
-            state = _look(tables, room, pending[i], speed, half, margin)
+            state = _look(tables, room, pending[i], speed, drifts, turns, half, margin)
             if state == _TOO_NEAR:
                 return False
             if state == _OPEN:
@@ -134,37 +135,47 @@ def _speed(tables: Tables, speeds: Any, pair_speeds: Any, code: int) -> float:
 
 
 @compiled
-def _look(tables: Tables, room: Room, code: int, speed: float, half: float, margin: float) -> int:
+def _look(
+    tables: Tables, room: Room, code: int, speed: float, drifts: Any, turns: Any, half: float, margin: float
+) -> int:
     """Return what is known of a pair on a stretch of some half length, with the robots placed in its middle."""
     if code < 0:
         a, b = tables.links[tables.pairs[~code, 0]], tables.links[tables.pairs[~code, 1]]
-        return _look_at(
-            tables, room, a[_SHAPE], room.frames[a[_STEP]], b[_SHAPE], room.frames[b[_STEP]], speed, half, margin
-        )
-    link, obstacle = tables.links[code // len(tables.obstacles)], code % len(tables.obstacles)
+        p, q = room.frames[a[_STEP]], room.frames[b[_STEP]]
+        return _look_at(tables, room, a[_SHAPE], p, b[_SHAPE], q, speed, (0.0, 0.0, 0.0), speed, half, margin)
+    number, obstacle = code // len(tables.obstacles), code % len(tables.obstacles)
+    link, drift = tables.links[number], (drifts[number, 0], drifts[number, 1], drifts[number, 2])
     pose, other = room.frames[link[_STEP]], tables.poses[obstacle]
-    return _look_at(tables, room, link[_SHAPE], pose, tables.obstacles[obstacle, 0], other, speed, half, margin)
+    shape = tables.obstacles[obstacle, 0]
+    return _look_at(tables, room, link[_SHAPE], pose, shape, other, speed, drift, turns[number], half, margin)
 
 
 @compiled
 def _look_at(
-    tables: Tables, room: Room, s: int, pose_s: Any, t: int, pose_t: Any, speed: float, half: float, margin: float
-) -> int:
+    tables: Tables, room: Room, s: int, pose_s: Any, t: int, pose_t: Any,
+    speed: float, drift: Vector, turn: float, half: float, margin: float,
+) -> int:  # fmt: skip
     reach = speed * (half + margin)
     m = relative(pose_s, pose_t)
-    gap = box_gap(m, tables.halves[s], tables.halves[t])
+    a, b = tables.halves[s], tables.halves[t]
+    gap = box_gap(m, a, b)
     if gap >= reach * reach:
         return _CLEAR
-    # Halving the stretch is quicker than measuring, unless it would be for nothing.
+    # While there is much to be halved, quick answers will do.
     fine = half <= 4 * margin
-    if not fine and 16 * gap >= reach * reach:
-        return _OPEN
-    if not fine and (tables.shapes[s, _IS_BOX] == 1 or tables.shapes[t, _IS_BOX] == 1):
-        # A box grown by the reach holds all that is as near as that.
-        if not _box_within(tables, s, t, m, reach, room.stack):
+    if not fine:
+        beyond = turn * half + speed * margin
+        grown = _reaches(pose_s, drift, half, beyond)
+        if boxes_apart(m, a[0] + grown[0], a[1] + grown[1], a[2] + grown[2], b[0], b[1], b[2]):
             return _CLEAR
-        return _TOO_NEAR if _box_within(tables, s, t, m, 0.0, room.stack) else _OPEN
-    # While there is much to be halved, it is enough to know that something is near.
+        if tables.shapes[s, _IS_BOX] == 1 and tables.shapes[t, _IS_BOX] == 1:
+            return _TOO_NEAR if not boxes_apart(m, a[0], a[1], a[2], b[0], b[1], b[2]) else _OPEN
+        if tables.shapes[s, _IS_BOX] == 1:
+            return _beside_box(tables, room, a, grown, t, m)
+        if tables.shapes[t, _IS_BOX] == 1:
+            return _beside_box(tables, room, b, _reaches(pose_t, drift, half, beyond), s, inverted(m))
+        if 16 * gap >= reach * reach:
+            return _OPEN
     apart = distance(tables, s, pose_s, t, pose_t, reach * reach, 0.0 if fine else reach * reach, room)
     if apart >= reach * reach:
         return _CLEAR
@@ -172,11 +183,19 @@ def _look_at(
 
 
 @compiled
-def _box_within(tables: Tables, s: int, t: int, m: Pose, reach: float, stack: Any) -> bool:
-    """Return whether one of two shapes that is a box, grown by a reach, meets the other; t is at pose m in s."""
-    a, b = tables.halves[s], tables.halves[t]
-    if tables.shapes[s, _IS_BOX] == 0:
-        return box_crosses(tables, b, reach, s, inverted(m), stack)
-    if tables.shapes[t, _IS_BOX] == 0:
-        return box_crosses(tables, a, reach, t, m, stack)
-    return not boxes_apart(m, a[0] + reach, a[1] + reach, a[2] + reach, b[0], b[1], b[2])
+def _reaches(pose: Any, drift: Vector, half: float, beyond: float) -> Vector:
+    """Return by how much a box must grow on each side to hold all that comes to it, by drifting and otherwise."""
+    x, y, z = drift
+    return (
+        abs(pose[0] * x + pose[4] * y + pose[8] * z) * half + beyond,
+        abs(pose[1] * x + pose[5] * y + pose[9] * z) * half + beyond,
+        abs(pose[2] * x + pose[6] * y + pose[10] * z) * half + beyond,
+    )
+
+
+@compiled
+def _beside_box(tables: Tables, room: Room, half: Any, grown: Vector, mesh: int, m: Pose) -> int:
+    """Return what is known of a box and a mesh, at pose m in the box's frame, that reaches so far on a stretch."""
+    if not box_crosses(tables, half[0] + grown[0], half[1] + grown[1], half[2] + grown[2], mesh, m, room.stack):
+        return _CLEAR
+    return _TOO_NEAR if box_crosses(tables, half[0], half[1], half[2], mesh, m, room.stack) else _OPEN

@@ -29,9 +29,9 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
             second[_IS_SOLID] > 0 or not _box_in_box(inverted(m), b, a)
         )
     if first[_IS_BOX] == 1 and _counts_as_solid(first, a, b):
-        crosses = box_crosses(tables, a, 0.0, t, m, stack)
+        crosses = box_crosses(tables, a[0], a[1], a[2], t, m, stack)
     elif second[_IS_BOX] == 1 and _counts_as_solid(second, b, a):
-        crosses = box_crosses(tables, b, 0.0, s, inverted(m), stack)
+        crosses = box_crosses(tables, b[0], b[1], b[2], s, inverted(m), stack)
     else:
         crosses = _trees_cross(tables, s, t, m, stack)
     if crosses:
@@ -58,9 +58,8 @@ def _box_in_box(m: Pose, a: Any, b: Any) -> bool:
 
 
 @compiled
-def box_crosses(tables: Tables, half: Any, grown: float, t: int, m: Pose, stack: Any) -> bool:
-    """Return whether a solid box, grown on all sides, meets any triangle of shape t, at pose m in the box's frame."""
-    h0, h1, h2 = half[0] + grown, half[1] + grown, half[2] + grown
+def box_crosses(tables: Tables, h0: float, h1: float, h2: float, t: int, m: Pose, stack: Any) -> bool:
+    """Return whether a solid box with half sizes h meets any triangle of shape t, at pose m in the box's frame."""
     stack[0] = tables.shapes[t, _START]
     count = 1
     while count > 0:
