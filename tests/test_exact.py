@@ -199,6 +199,7 @@ class TestEdges:
         q1 = q0 + 0.1 * model.space.difference(q0, np.roll(q0, 1, axis=0))
         compiled = model.edge_is_free(q0, q1)
         monkeypatch.setattr(model._queries, "_default", "mujoco")
+        monkeypatch.setattr(model._queries, "_ready", None)
         assert compiled.tolist() == model.edge_is_free(q0, q1).tolist()
 
     def test_are_none_if_there_are_none(self) -> None:

@@ -63,6 +63,7 @@ class ContactQueries:
         self._of_triangles: _Triangles | None = None
         self._default: Engine = compiled.options.engine
         self._exact: ExactEngine | None = None
+        self._ready: ExactEngine | None = None
         self._moving = tuple(p for p in self._pairs if not p.constant)
         between_links = [p for p in self._moving if p.kind != "obstacle"]
         self.steps = EdgeSteps(assembly, self._space)
@@ -185,12 +186,17 @@ class ContactQueries:
         Raises:
             ValueError: It is asked for by name, and numba is not installed.
         """
+        # What a scene has chosen for itself, and made, is handed out at once: a verdict may take less than finding it.
+        if engine is None and self._ready is not None:
+            return self._ready
         if not self._is_exact(engine):
             return None
         if self._exact is None:
             with self._lock:
                 if self._exact is None:
                     self._exact = ExactEngine(self._assembly, self._space, self._moving, self._surfaces)
+        if engine is None:
+            self._ready = self._exact
         return self._exact
 
     def _is_exact(self, engine: Engine | None) -> bool:

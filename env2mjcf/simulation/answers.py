@@ -80,7 +80,7 @@ class Answers(EdgeAnswers):
             concurrent.futures.BrokenExecutor: A worker process died, and the executor does not replace it.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
-            return self._queries.collisions(one)[0].item()
+            return self._queries.collisions(one).item()
         return self._verdicts(ContactQueries.collisions, q, threads, executor, progress, engine)
 
     def is_valid(
@@ -97,7 +97,7 @@ class Answers(EdgeAnswers):
         Arguments, result and errors are those of `in_collision`.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
-            return self._queries.validities(one)[0].item()
+            return self._queries.validities(one).item()
         return self._verdicts(ContactQueries.validities, q, threads, executor, progress, engine)
 
     def clearance(

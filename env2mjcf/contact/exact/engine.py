@@ -57,11 +57,12 @@ class ExactEngine:
         require()
         self._tables = program(assembly, space, pairs, surfaces)
         self._entries = _entries()
+        self._collisions = self._entries.collisions
 
     def collisions(self, q: Array) -> Bools:
         """Return whether any pair touches, (n,), at configurations (n, dim)."""
         out = np.empty(len(q), dtype=np.bool_)
-        self._entries.collisions(*self._tables, np.ascontiguousarray(q), out)
+        self._collisions(*self._tables, np.ascontiguousarray(q), out)
         return out
 
     def validities(self, q: Array) -> Bools:

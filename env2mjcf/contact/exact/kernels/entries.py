@@ -12,7 +12,7 @@ from .collisions import collides, measure
 from .compiling import SOURCES, compiled, entry
 from .edges import edge_collides
 from .frames import place
-from .opening import Room, Tables, opened, room
+from .opening import Room, Tables, opened, room, room_for_verdicts
 from .proofs import LEVELS, edge_is_free
 from .validity import within_boundary, within_limits
 
@@ -74,13 +74,13 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
     def collisions(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _collisions(tables, room(tables), q, out)
+        _collisions(tables, room_for_verdicts(tables), q, out)
 
     @entry
     def validities(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _validities(tables, room(tables), q, out)
+        _validities(tables, room_for_verdicts(tables), q, out)
 
     @entry
     def distances(integers: Any, floats: Any, q: Any, out: Any) -> None:

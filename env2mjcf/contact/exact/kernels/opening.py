@@ -93,6 +93,20 @@ class Room(NamedTuple):
 
 
 @compiled_with_arrays
+def room_for_verdicts(tables: Tables) -> Room:
+    """Return room for looking at configurations one by one, without that for edges and distances: it is made sooner."""
+    nothing = np.empty(0)
+    return Room(
+        nothing,
+        np.empty((len(tables.steps), 12)),
+        np.empty((len(tables.links), 3)),
+        np.empty(tables.counts[0, 1], dtype=np.int64),
+        np.empty(tables.counts[0, 2], dtype=np.int64),
+        nothing,
+    )
+
+
+@compiled_with_arrays
 def room(tables: Tables) -> Room:
     """Return room to work in."""
     return Room(
