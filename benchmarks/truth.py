@@ -113,6 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     print("  OUTSIDE", line, flush=True)
     results = [done[c.name] for c in cases]
     command = "python benchmarks/truth.py" + ("" if chosen.engine == "mujoco" else f" --engine {chosen.engine}")
+    command += "" if count == parser.get_default("count") else f" --count {count}"
     page = text(results, command, count, chosen.engine)
     if chosen.quick or chosen.scenes:
         print(page)
