@@ -30,7 +30,7 @@ def least_distance(tables: Tables, room: Room, most: float) -> float:
             least = _to_obstacle(tables, link, room, _nearest_box(tables, link, room), least)
     for link in range(len(tables.links)):
         if tables.links[link, _TOP] >= 0:
-            least = _to_obstacles(tables, link, room, least)
+            least = _to_others(tables, link, room, _nearest_box(tables, link, room), least)
     frames = room.frames
     for i in range(len(tables.pairs)):
         a, b = tables.links[tables.pairs[i, 0]], tables.links[tables.pairs[i, 1]]
@@ -42,7 +42,8 @@ def least_distance(tables: Tables, room: Room, most: float) -> float:
 
 
 @compiled
-def _to_obstacles(tables: Tables, link: int, room: Room, least: float) -> float:
+def _to_others(tables: Tables, link: int, room: Room, known: int, least: float) -> float:
+    """Return the least distance of a link from all obstacles but one, or `least` if that is less."""
     pose = room.frames[tables.links[link, _STEP]]
     span, stack = room.spans[link], room.top
     stack[0] = tables.links[link, _TOP]
@@ -59,8 +60,8 @@ def _to_obstacles(tables: Tables, link: int, room: Room, least: float) -> float:
                 if child >= 0:
                     stack[count] = child
                     count += 1
-                    continue
-                least = _to_obstacle(tables, link, room, ~child, least)
+                elif ~child != known:
+                    least = _to_obstacle(tables, link, room, ~child, least)
     return least
 
 
