@@ -55,7 +55,7 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
     Raises:
         ConversionError: The folder cannot be written, or MuJoCo refuses the scene.
         FormatError, GeometryError, KinematicsError: The input cannot be used.
-        TypeError, ValueError, NotImplementedError: An option cannot.
+        TypeError, ValueError: An option cannot.
     """
     chosen = Options.from_keywords(options)
     log = DiagnosticLog(chosen.strict)

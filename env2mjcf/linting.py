@@ -75,7 +75,7 @@ def lint(
         progress: Show a progress bar on a terminal.
 
     Raises:
-        ValueError, NotImplementedError: An option has a value that it cannot take.
+        ValueError: An option has a value that it cannot take.
     """
     given = options or Options()
     chosen = Options.from_keywords(

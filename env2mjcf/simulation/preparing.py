@@ -27,7 +27,6 @@ def load(path: PathArgument, **options: Any) -> Scene:
         GeometryError: A mesh is missing or unusable.
         KinematicsError: The bodies of a robot do not hang together.
         ConversionError: MuJoCo cannot express, or refuses, the scene.
-        NotImplementedError: A value of an option is not available yet.
         TypeError: An unknown option.
         ValueError: A value that an option cannot take.
     """
