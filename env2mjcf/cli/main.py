@@ -11,6 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 
 from ..errors import Env2MjcfError, did_you_mean
+from ..view.offscreen import RenderError
 from .arguments import Verb, parse
 from .printing import one_line, print_diagnostics, print_json
 
@@ -25,6 +26,8 @@ VERBS = {
     "check": ("check", "Check", "tell whether configurations are valid, and who touches whom"),
     "lint": ("lint", "Lint", "list everything doubtful in scenes, robots and meshes"),
     "batch": ("batch", "Batch", "write verdicts on files of configurations, larger than memory if need be"),
+    "render": ("render", "Render", "draw a scene into a PNG file, without a screen"),
+    "play": ("play", "Play", "film robots that follow a path"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 
@@ -116,7 +119,7 @@ def _run(name: str, verb: Verb) -> int:
         raise
     except Exception as error:
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
-        if type(error) not in (ValueError, NotImplementedError):
+        if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
         _show_traceback(verb.output.debug)
         _complain(f"{name}: {error}")
