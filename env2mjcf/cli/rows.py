@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiagnosticLog, FormatError
-from ..formats.query import split_row
+from ..formats.rows import split_row
 from ..formats.source import Source, read_source
 from ..options import Limits
 from ..simulation.scene import Scene
