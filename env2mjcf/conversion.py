@@ -18,7 +18,7 @@ from .report import Report
 from .simulation.loading import load_file
 from .simulation.preparing import prepare
 from .simulation.scene import Scene
-from .writing import write_beside
+from .writing import replaced
 
 _ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
 
@@ -96,7 +96,8 @@ def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[P
             path = folder / relative
             # The name holds the hash of the content: what is there and whole is right.
             if not path.exists() or path.stat().st_size != len(data):
-                write_beside(path, data)
+                with replaced(path) as beside:
+                    beside.write_bytes(data)
                 made.append(path)
         staged.write_bytes(document.xml.encode("utf-8"))
         load_file(staged, document, scene.compiled.assembly, log)

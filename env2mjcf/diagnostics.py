@@ -186,4 +186,5 @@ CATALOGUE: dict[str, str] = {
     "CFG531": "Velocities or controls of a roadmap are not used.",
     "CFG532": "A path, roadmap or query cannot be written.",
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
+    "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
 }

@@ -1,21 +1,25 @@
-"""Writes files whole or not at all."""
+"""Files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
 import secrets
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 
-def write_beside(path: Path, data: bytes) -> None:
-    """Write a file beside its place, then rename it there.
+@contextmanager
+def replaced(file: str | os.PathLike[str]) -> Generator[Path]:
+    """Let a file be written beside its place, then rename it there; remove it where writing fails.
 
-    Raises:
-        OSError: It cannot be written; what was there before still is.
+    Yields:
+        The path to write to; it ends as the file does.
     """
-    beside = path.with_name(f".{path.name}-{secrets.token_hex(8)}")
+    path = Path(os.fsdecode(file))
+    beside = path.with_name(f".{secrets.token_hex(8)}-{path.name}")
     try:
-        beside.write_bytes(data)
+        yield beside
         os.replace(beside, path)
     except BaseException:
         beside.unlink(missing_ok=True)

@@ -16,7 +16,7 @@ from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..space import ConfigurationSpace
 from ..transforms import Array
-from ..writing import write_beside
+from ..writing import replaced
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -82,7 +82,8 @@ def write(file: PathArgument, text: str) -> Path:
     """
     path = Path(os.fspath(file))
     try:
-        write_beside(path, text.encode("utf-8"))
+        with replaced(path) as beside:
+            beside.write_bytes(text.encode("utf-8"))
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         DiagnosticLog().fail(
