@@ -15,6 +15,8 @@ from .writer import Element, add, comment, number, numbers
 
 _STANDARD_GRAVITY = 9.80665
 _WIRE_COLOR = "0.35 0.38 0.42 0.6"
+OVERVIEW = (0.55, -1.0, 0.75)
+"""Where the camera `overview` stands, seen from the scene: in front, to the right and above."""
 
 
 def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
@@ -113,7 +115,7 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
 
 def _camera(center: Array, extent: float) -> dict[str, str]:
     """Look at the whole scene from the front right and above."""
-    back = np.array([0.55, -1.0, 0.75])
+    back = np.array(OVERVIEW)
     back /= np.linalg.norm(back)
     right = np.cross((0, 0, 1), back)
     right /= np.linalg.norm(right)
@@ -131,14 +133,17 @@ def _corners(boundary: Boundary, assembly: Assembly) -> tuple[Array, Array]:
     return lower, upper
 
 
+def boundary_lines(boundary: Boundary, assembly: Assembly) -> list[tuple[Array, Array]]:
+    """Return the ends of the lines that a boundary is drawn with: edges of a box, great circles of a ball."""
+    if not boundary.lower:
+        return _rings(boundary)
+    box = np.array(_corners(boundary, assembly))
+    corners = [box[list(c), range(3)] for c in itertools.product((0, 1), repeat=3)]
+    return [(a, b) for a, b in itertools.combinations(corners, 2) if np.count_nonzero(a != b) == 1]
+
+
 def _add_wires(world: Element, boundary: Boundary, assembly: Assembly) -> None:
-    if boundary.lower:
-        lower, upper = _corners(boundary, assembly)
-        box = np.array([lower, upper])
-        corners = [box[list(c), range(3)] for c in itertools.product((0, 1), repeat=3)]
-        lines = [(a, b) for a, b in itertools.combinations(corners, 2) if np.count_nonzero(a != b) == 1]
-    else:
-        lines = _rings(boundary)
+    lines = boundary_lines(boundary, assembly)
     radius = 5e-4 * max(assembly.extent, *(float(np.linalg.norm(b - a)) for a, b in lines))
     for i, (a, b) in enumerate(lines):
         add(
