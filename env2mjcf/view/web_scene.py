@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -20,14 +21,19 @@ if TYPE_CHECKING:
 Colour = tuple[int, int, int]
 
 _TOUCHING: Colour = (214, 69, 65)
-_TINT = 0.65
-_TOUCHING_OPACITY = 0.55
+# How much of a body that touches is tinted, and how opaque it is: marks inside it are to be seen.
+_LINK_TINT, _LINK_OPACITY = 0.8, 0.75
+_OBSTACLE_TINT, _OBSTACLE_OPACITY = 0.45, 0.35
 _SEE_THROUGH = 0.25
 _MARK: Colour = (122, 12, 22)
 _WIRE: Colour = (120, 128, 138)
 _TRAIL: Colour = (44, 93, 138)
 _BACKGROUND = ((244, 246, 248), (216, 224, 232))
 _FIELD_OF_VIEW = math.radians(40)
+# Room around what is seen.
+_AROUND = 1.06
+# A boundary is seen whole if it is no more than so many times as large as all bodies.
+_BOUNDARY_SEEN = 2.0
 # Of the size of what is seen.
 _MARK_RADIUS, _NORMAL_LENGTH = 0.006, 0.07
 
@@ -55,7 +61,7 @@ class WebScene:
             _place(self._meshes[part.name], part.pose)
         lower, upper = _seen(scene, rows)
         self._size = float(np.linalg.norm(upper - lower))
-        self._set_stage((lower + upper) / 2)
+        self._set_stage(lower, upper)
         if assembly.environment.boundary is not None:
             lines = np.array(boundary_lines(assembly.environment.boundary, assembly))
             server.scene.add_line_segments("/boundary", lines, _WIRE, thickness=1.2, thickness_units="screen")
@@ -116,17 +122,19 @@ class WebScene:
         for name in names:
             handle, colour = self._meshes[name], self._colours[name]
             if name in self._touching:
-                handle.color, handle.opacity = _mixed(colour, _TOUCHING), _TOUCHING_OPACITY
+                fixed = name in self._fixed
+                handle.color = _mixed(colour, _TOUCHING, _OBSTACLE_TINT if fixed else _LINK_TINT)
+                handle.opacity = _OBSTACLE_OPACITY if fixed else _LINK_OPACITY
             else:
                 handle.color = colour
                 handle.opacity = _SEE_THROUGH if self._see_through and name in self._fixed else None
 
-    def _set_stage(self, center: Array) -> None:
-        """Place the camera as the MJCF's `overview` stands, light and background."""
+    def _set_stage(self, lower: Array, upper: Array) -> None:
+        """Place the camera where the MJCF's `overview` stands, as near as it sees a whole box; light and background."""
         # The shadows of the page reach 20 units from the camera, whatever the size of the scene.
         self._server.scene.configure_default_lights(cast_shadow=False)
-        back = np.array(OVERVIEW) / np.linalg.norm(OVERVIEW)
-        distance = 0.5 * self._size / math.sin(_FIELD_OF_VIEW / 2) * 1.05
+        center, back = (lower + upper) / 2, np.array(OVERVIEW) / np.linalg.norm(OVERVIEW)
+        distance = _distance(lower - center, upper - center, back)
         camera = self._server.initial_camera
         camera.fov = _FIELD_OF_VIEW
         camera.near, camera.far = distance / 1000, distance * 100
@@ -138,15 +146,35 @@ class WebScene:
 
 
 def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
-    """Return the corners of a box around all bodies at home, and the balls around links at some configurations."""
+    """Return the corners of a box around bodies at home, links at some configurations, and a boundary of like size."""
     assembly = scene.compiled.assembly
     lower, upper = assembly.lower, assembly.upper
     if len(rows) and scene.link_names:
-        origins = scene.link_poses(rows)[..., :3, 3]
-        radii = np.array([p.radius for r in assembly.robots for p in r.links])[:, None]
-        lower = np.minimum(lower, (origins - radii).min(axis=(0, 1)))
-        upper = np.maximum(upper, (origins + radii).max(axis=(0, 1)))
+        poses = scene.link_poses(rows)
+        for i, part in enumerate(p for r in assembly.robots for p in r.links):
+            corners = _corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
+            world = np.einsum("nij,cj->nci", poses[:, i, :3, :3], corners) + poses[:, i, None, :3, 3]
+            lower, upper = np.minimum(lower, world.min(axis=(0, 1))), np.maximum(upper, world.max(axis=(0, 1)))
+    if assembly.environment.boundary is not None:
+        wires = np.array(boundary_lines(assembly.environment.boundary, assembly)).reshape(-1, 3)
+        low, high = np.minimum(lower, wires.min(axis=0)), np.maximum(upper, wires.max(axis=0))
+        if np.linalg.norm(high - low) <= _BOUNDARY_SEEN * np.linalg.norm(upper - lower):
+            return low, high
     return lower, upper
+
+
+def _distance(lower: Array, upper: Array, back: Array) -> float:
+    """Return from how far a square picture holds a box about the origin, seen from the direction `back`."""
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    corners = _corners(lower, upper)
+    aside = np.abs(corners @ np.stack([right, np.cross(back, right)], axis=1)).max(axis=1)
+    return _AROUND * float(np.max(aside / math.tan(_FIELD_OF_VIEW / 2) + corners @ back))
+
+
+def _corners(lower: Array, upper: Array) -> Array:
+    """Return the corners of a box, (8, 3)."""
+    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
 
 
 def _colour(scene: Scene, part: Part) -> Colour:
@@ -154,8 +182,8 @@ def _colour(scene: Scene, part: Part) -> Colour:
     return red, green, blue
 
 
-def _mixed(colour: Colour, tint: Colour) -> Colour:
-    red, green, blue = (round(_TINT * b + (1 - _TINT) * a) for a, b in zip(colour, tint, strict=True))
+def _mixed(colour: Colour, tint: Colour, share: float) -> Colour:
+    red, green, blue = (round(share * b + (1 - share) * a) for a, b in zip(colour, tint, strict=True))
     return red, green, blue
 
 

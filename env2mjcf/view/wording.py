@@ -15,7 +15,7 @@ from .judging import Judgement
 _GOOD, _BAD, _DIM = "#2f855a", "#c53030", "#718096"
 _LISTED = 40
 # A box that does not grow: the sliders below stay where they are while one of them is dragged.
-_BOX = "height:9.5em;overflow-y:auto;margin:0.4em 0.8em;font-size:0.82em;line-height:1.45"
+_BOX = "height:9.5em;overflow-y:auto;margin:0.4em 0.8em 0.9em;font-size:0.82em;line-height:1.45"
 
 
 def text(name: str) -> str:
