@@ -133,6 +133,13 @@ class WebScene:
         """Place the camera where the MJCF's `overview` stands, as near as it sees a whole box; light and background."""
         # The shadows of the page reach 20 units from the camera, whatever the size of the scene.
         self._server.scene.configure_default_lights(cast_shadow=False)
+        # A sky of one colour instead of a photograph, which browsers without a GPU prepare for seconds.
+        self._server.scene.configure_environment_map(None)
+        self._server.scene.add_light_hemisphere(
+            "/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=1.5
+        )
+        # From the side, so that walls at right angles differ.
+        self._server.scene.add_light_directional("/lamp", intensity=0.9, position=(1.0, -0.35, 0.3))
         center, back = (lower + upper) / 2, np.array(OVERVIEW) / np.linalg.norm(OVERVIEW)
         distance = _distance(lower - center, upper - center, back)
         camera = self._server.initial_camera
