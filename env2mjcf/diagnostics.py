@@ -162,4 +162,6 @@ CATALOGUE: dict[str, str] = {
     "CFG507": "Velocities or info fields behind configurations are not used.",
     "CFG508": "A query holds one configuration only.",
     "CFG509": "The output of a batch cannot be written.",
+    "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
+    "CFG551": "A path to be shown holds one configuration only.",
 }

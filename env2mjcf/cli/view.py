@@ -55,7 +55,6 @@ class View:
 
     def run(self) -> int:
         """Show the scene until Ctrl-C."""
-        from ..simulation.preparing import load
         from ..view import native, web_server
 
         if self.native:
@@ -64,6 +63,8 @@ class View:
                 raise ValueError("--native plays no path: leave one of --native and --path out")
         else:
             web_server.require()
+        from ..simulation.preparing import load
+
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
@@ -76,9 +77,12 @@ class View:
         return self._serve(scene, path)
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
+        from ..view.playback import doubts
         from .configurations import of_file
 
-        return of_file(scene, str(self.path), False, self.options.limits, log).q
+        q = of_file(scene, str(self.path), False, self.options.limits, log).q
+        doubts(scene, q, str(self.path), log)
+        return q
 
     def _serve(self, scene: Scene, path: Array | None) -> int:
         from ..view import web_server

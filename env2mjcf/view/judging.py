@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -64,9 +65,12 @@ class LiveJudge:
         beyond = tuple(int(i) for i in np.flatnonzero(self._scene.space.broken(q)))
         return Judgement(collides, None if collides else (), beyond, self._outside(q))
 
-    def contacts(self, q: Array) -> tuple[Contact, ...]:
-        """Return the contacts of q, (dim,)."""
-        return tuple(self._scene.contacts(q, engine=self._engine))
+    def judge(self, q: Array) -> Judgement:
+        """Return all that is known of q, (dim,)."""
+        judgement = self.verdict(q)
+        if judgement.contacts is not None:
+            return judgement
+        return dataclasses.replace(judgement, contacts=tuple(self._scene.contacts(q, engine=self._engine)))
 
     def valid(self, q: Array) -> bool:
         """Return whether q, (dim,), is valid."""

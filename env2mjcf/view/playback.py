@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..contact.motion import MotionBounds
+from ..errors import DiagnosticLog, FormatError
 from ..simulation.scene import Scene
 from ..transforms import Array
 
@@ -64,6 +65,23 @@ class Track:
     def rows(self, n: int) -> Array:
         """Return n configurations evenly along the track, both ends included, (n, dim)."""
         return np.array([self.at(x) for x in np.linspace(0.0, 1.0, n)])
+
+
+def doubts(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:
+    """Report what is doubtful about a path, (k, dim), that somebody wants to see."""
+    if len(q) == 1:
+        log.warn(FormatError, "CFG551", file, f"{file} holds one configuration; expected a path of two at least")
+    broken = scene.space.broken(q)
+    if not broken.any():
+        return
+    row, i = (int(x) for x in np.argwhere(broken)[0])
+    number, lower, upper = (scene.space.encode(v)[i] for v in (q[row], scene.space.lower, scene.space.upper))
+    log.warn(
+        FormatError, "CFG550", file,
+        f"{int(broken.any(axis=1).sum())} of {len(q)} configurations of {file} are beyond the limits; in number "
+        f"{row + 1} {scene.space.names[i]} is {number:.6g}, its limits are {lower:.6g} to {upper:.6g}",
+        hint="are its numbers in the units of the scene's file?",
+    )  # fmt: skip
 
 
 class Player:

@@ -11,7 +11,7 @@ import numpy as np
 from ..simulation.scene import Scene
 from ..transforms import Array
 from .dials import Dials
-from .judging import Judgement, LiveJudge, Newest
+from .judging import LiveJudge, Newest
 from .page import Page
 from .playback import Player, Track
 from .web_scene import WebScene
@@ -151,8 +151,7 @@ class Viewer:
         judgement = self._judge.verdict(q)
         if judgement.contacts is None and not overtaken():
             self._page.report(judgement, q)
-            contacts = self._judge.contacts(q)
-            judgement = Judgement(judgement.collides, contacts, judgement.beyond, judgement.outside)
+            judgement = self._judge.judge(q)
         if judgement.contacts is not None:
             with self._server.atomic():
                 self._page.report(judgement, q)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..contact.types import Contact
-from ..geometry.assembly import Part
+from ..geometry.assembly import Assembly, Part
 from ..mjcf.scenery import OVERVIEW, boundary_lines
 from ..simulation.scene import Scene
 from ..transforms import Array, quaternion_from_matrix
@@ -62,6 +62,8 @@ class WebScene:
         lower, upper = _seen(scene, rows)
         self._size = float(np.linalg.norm(upper - lower))
         self._set_stage(lower, upper)
+        if scene.compiled.options.ground:
+            self._add_ground(assembly)
         if assembly.environment.boundary is not None:
             lines = np.array(boundary_lines(assembly.environment.boundary, assembly))
             server.scene.add_line_segments("/boundary", lines, _WIRE, thickness=1.2, thickness_units="screen")
@@ -107,6 +109,14 @@ class WebScene:
         return self._server.scene.add_mesh_simple(
             f"/bodies/{index}", part.mesh.vertices, part.mesh.faces, color=self._colours[part.name], flat_shading=True,
             side="double",
+        )  # fmt: skip
+
+    def _add_ground(self, assembly: Assembly) -> None:
+        x, y, _ = (assembly.lower + assembly.upper) / 2
+        cell = self._size / 20
+        self._server.scene.add_grid(
+            "/ground", 2 * self._size, 2 * self._size, cell_size=cell, section_size=5 * cell, cell_color=_WIRE,
+            section_color=_WIRE, position=(x, y, assembly.lower[2]),
         )  # fmt: skip
 
     def _add_spheres(self, name: str, places: Array) -> None:
