@@ -82,7 +82,7 @@ class Tab:
         self.page.on("request", lambda r: self.requests.append(r.url))
         self.page.on("websocket", lambda w: self.requests.append(w.url))
         self.page.goto(address)
-        self.page.wait_for_selector("#status", timeout=20_000)
+        self.page.wait_for_selector("#status", timeout=60_000)
 
     def slider(self, name: str) -> Any:
         """Return what is dragged of a degree of freedom."""
@@ -124,7 +124,7 @@ class Tab:
             "words => document.querySelector('#status')?.innerText === words"
             " && !document.querySelector('#reasons').innerText.includes('looking')",
             arg=words,
-            timeout=10_000,
+            timeout=30_000,
         )
 
     def reasons(self) -> list[str]:

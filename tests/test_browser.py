@@ -55,6 +55,7 @@ def test_a_hand_on_a_slider_moves_the_robot_into_a_wall_and_a_path_out_of_it(tmp
         tab.press("play")
         tab.page.wait_for_function("document.querySelector('#reasons').innerText.includes('cube and block')")
         tab.press("pause")
+        tab.page.get_by_role("button", name="play", exact=True).wait_for()
         seen = tab.numbers()
         assert 0 < seen["along"] < 1
         # The way is straight, and everything is as far along it.

@@ -33,9 +33,9 @@ _FIELD_OF_VIEW = math.radians(40)
 # Room around what is seen.
 _AROUND = 1.06
 # A boundary is seen whole if it is no more than so many times as large as all bodies.
-_BOUNDARY_SEEN = 2.0
-# Of the size of what is seen.
-_MARK_RADIUS, _NORMAL_LENGTH = 0.006, 0.07
+_BOUNDARY_SEEN = 1.5
+# Of the extent.
+_MARK_RADIUS, _NORMAL_LENGTH = 0.005, 0.05
 
 
 class WebScene:
@@ -60,7 +60,7 @@ class WebScene:
         for part in fixed:
             _place(self._meshes[part.name], part.pose)
         lower, upper = _seen(scene, rows)
-        self._size = float(np.linalg.norm(upper - lower))
+        self._extent = assembly.extent
         self._set_stage(lower, upper)
         if scene.compiled.options.ground:
             self._add_ground(assembly)
@@ -83,9 +83,9 @@ class WebScene:
             self._server.scene.remove_by_name("/contacts")
             return
         places = np.array([c.position for c in contacts])
-        ends = places + self._size * _NORMAL_LENGTH * np.array([c.normal for c in contacts])
+        ends = places + self._extent * _NORMAL_LENGTH * np.array([c.normal for c in contacts])
         self._add_spheres("/contacts/places", places)
-        radius = self._size * _MARK_RADIUS
+        radius = self._extent * _MARK_RADIUS
         self._server.scene.add_arrows(
             "/contacts/normals", np.stack([places, ends], axis=1), _MARK, shaft_radius=radius / 3,
             head_radius=radius, head_length=3 * radius,
@@ -113,16 +113,16 @@ class WebScene:
 
     def _add_ground(self, assembly: Assembly) -> None:
         x, y, _ = (assembly.lower + assembly.upper) / 2
-        cell = self._size / 20
+        size = 2 * self._extent
         self._server.scene.add_grid(
-            "/ground", 2 * self._size, 2 * self._size, cell_size=cell, section_size=5 * cell, cell_color=_WIRE,
+            "/ground", size, size, cell_size=size / 40, section_size=size / 8, cell_color=_WIRE,
             section_color=_WIRE, position=(x, y, assembly.lower[2]),
         )  # fmt: skip
 
     def _add_spheres(self, name: str, places: Array) -> None:
         import trimesh
 
-        ball = trimesh.creation.icosphere(subdivisions=2, radius=self._size * _MARK_RADIUS)
+        ball = trimesh.creation.icosphere(subdivisions=2, radius=self._extent * _MARK_RADIUS)
         unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
         self._server.scene.add_batched_meshes_simple(
             name, ball.vertices, ball.faces, unturned, places, batched_colors=_MARK, cast_shadow=False, lod="off"
