@@ -21,7 +21,8 @@ from env2mjcf import Scene
 from env2mjcf.view import web_server, wording
 from env2mjcf.view.dials import Dials
 from env2mjcf.view.judging import LiveJudge, Newest
-from env2mjcf.view.playback import Track
+from env2mjcf.view.playback import Player, Track
+from env2mjcf.view.viewer import Viewer
 
 ROOT = Path(__file__).parents[1]
 NOTHING = np.zeros((0, 6))
@@ -173,6 +174,71 @@ def test_a_track_turns_the_short_way_round(cube: Scene) -> None:
 def test_a_track_may_stand_still(cube: Scene) -> None:
     for rows in (np.zeros((1, 6)), np.zeros((3, 6))):
         np.testing.assert_array_equal(Track(cube, rows).at(0.7), np.zeros(6))
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_a_player_comes_to_the_end_and_stays_or_begins_again(loop: bool) -> None:
+    shown: list[float] = []
+    ended, long_enough = threading.Event(), threading.Event()
+
+    def show(fraction: float) -> None:
+        shown.append(fraction)
+        if len(shown) >= 20:
+            long_enough.set()
+
+    player = Player(0.3, show, ended.set)
+    player.loop = loop
+    player.play()
+    try:
+        assert (long_enough if loop else ended).wait(20)
+        if loop:
+            assert min(np.diff(shown)) < 0
+            assert not ended.is_set()
+        else:
+            assert shown[-1] == 1.0
+            assert shown == sorted(shown)
+            assert not player.playing
+    finally:
+        player.close()
+
+
+# The page.
+
+PAGES = [*sorted(MODELS.glob("*/*.env")), MODELS / "xml-arm" / "xml-arm.xml", MODELS / "maze" / "maze.xml"]
+
+
+@pytest.mark.parametrize("file", PAGES, ids=lambda p: p.name)
+def test_every_scene_can_be_shown_with_one_slider_for_each_number_of_the_file(file: Path) -> None:
+    pytest.importorskip("viser", reason="no viser: pip install 'env2mjcf[view]'")
+    query = file.with_suffix(".query")
+    robots = [file.with_suffix(".robot")] if file.with_suffix(".robot").exists() and file.suffix == ".env" else []
+    known = {"query": query} if query.exists() and file.suffix == ".env" else {}
+    scene = env2mjcf.load(file, robots=robots, **known)
+    path = scene.queries[0].q if scene.queries else scene.space.home[None]
+    with web_server.serving(web_server.free_port(), "title") as server:
+        viewer = Viewer(server, scene, path)
+        try:
+            assert len(viewer.page.values()) == scene.space.dim
+            # Whatever is chosen is shown to the last bit.
+            for q in (path[-1], scene.space.sample(1, 3)[0], scene.space.home):
+                viewer.go(q)
+                np.testing.assert_array_equal(viewer.q, q)
+                np.testing.assert_array_equal(viewer.page.values(), scene.space.encode(q))
+            viewer.random()
+            assert scene.is_valid(viewer.q, engine="mujoco")
+        finally:
+            viewer.close()
+
+
+def test_a_scene_without_a_robot_can_be_shown(tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="no viser: pip install 'env2mjcf[view]'")
+    text = "Boundary Box [-10:10 ; -10:10 ; -10:10]\n\nMultibodies\n1\n\nPassive\ncube.g 0 0 0 0 0 0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, text))
+    with web_server.serving(web_server.free_port(), "title") as server:
+        viewer = Viewer(server, scene)
+        viewer.random()
+        viewer.close()
+        assert viewer.page.values() == []
 
 
 # The server.

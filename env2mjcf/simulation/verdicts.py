@@ -93,7 +93,7 @@ class Judge:
             collides,
             () if self.in_limits[index] else self._broken_limits(q),
             () if self.inside[index] else self._outside(q),
-            deepest(scene.contacts(q)) if collides else (),
+            _deepest(scene.contacts(q)) if collides else (),
         )
 
     def rough(self, verdict: Verdict) -> bool:
@@ -113,11 +113,11 @@ class Judge:
         return tuple(name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0])
 
 
-def deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
+def _deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
     """Return the deepest contact of each pair."""
-    found: dict[tuple[str, str], Contact] = {}
+    deepest: dict[tuple[str, str], Contact] = {}
     for contact in contacts:
         pair = (contact.link, contact.other)
-        if pair not in found or contact.distance < found[pair].distance:
-            found[pair] = contact
-    return tuple(found.values())
+        if pair not in deepest or contact.distance < deepest[pair].distance:
+            deepest[pair] = contact
+    return tuple(deepest.values())

@@ -79,6 +79,7 @@ class Page:
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
         self._reasons = gui.add_html("")
+        self._listed = False
         self._add_places()
         if track is not None:
             self._add_path(track)
@@ -94,12 +95,20 @@ class Page:
     def report(self, judgement: Judgement, q: Array) -> None:
         """Say what is known of the configuration that is shown."""
         self._status.content = wording.status(judgement)
-        self._reasons.content = wording.reasons(judgement, self._scene, q)
+        # A list that is only a moment old is better than one that flickers while a slider is dragged.
+        if judgement.contacts is not None or not self._listed:
+            self._reasons.content = wording.reasons(judgement, self._scene, q)
+        if judgement.contacts is not None:
+            self._listed = bool(judgement.contacts)
 
     def notify(self, message: str) -> None:
         """Tell everybody something for a moment."""
         for client in self._server.get_clients().values():
             client.add_notification("env2mjcf", message, auto_close_seconds=5.0)
+
+    def values(self) -> list[float]:
+        """Return where the sliders stand, in the file's numbers."""
+        return [slider.value for slider in self._sliders]
 
     def set_values(self, values: list[float]) -> None:
         """Put the sliders where the configuration is."""
@@ -174,7 +183,7 @@ class Page:
     def _turned(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         # Assigning to a slider calls back, too.
         if event.client_id is not None:
-            self._controls.turned([s.value for s in self._sliders])
+            self._controls.turned(self.values())
 
 
 def _units(dials: tuple[Dial, ...]) -> str:

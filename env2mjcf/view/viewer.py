@@ -14,6 +14,7 @@ from .dials import Dials
 from .judging import LiveJudge, Newest
 from .page import Page
 from .playback import Player, Track
+from .stage import set_stage
 from .web_scene import WebScene
 
 if TYPE_CHECKING:
@@ -33,6 +34,10 @@ class Viewer:
         server: The page.
         scene: The scene.
         path: (k, dim) configurations to be played, or None.
+
+    Attributes:
+        q: (dim,) what is shown.
+        page: The panel.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene, path: Array | None = None) -> None:
@@ -43,16 +48,17 @@ class Viewer:
         shown = [q.q for q in scene.queries] + ([path] if path is not None else [])
         rows = np.vstack([np.zeros((0, scene.space.dim)), *shown])
         self._dials = Dials(scene, rows)
-        self._web = WebScene(server, scene, rows)
+        set_stage(server, scene, rows)
+        self._web = WebScene(server, scene)
         self._track = None if path is None else Track(scene, path)
         self._draws = 0
         self._player: Player | None = None
         first = self._first(path)
         hidden = _is_enclosed(scene, first)
         self._web.see_through(hidden)
-        self._page = Page(server, self._dials, scene, self._track, self, hidden)
+        self.page = Page(server, self._dials, scene, self._track, self, hidden)
         if self._track is not None:
-            self._player = Player(self._track.seconds, self._tick, self._page.paused)
+            self._player = Player(self._track.seconds, self._tick, self.page.paused)
             self._web.trail(_trail(scene, self._track))
         self._newest = Newest[Array](self._judge_shown)
         self.q = scene.space.home.copy()
@@ -70,7 +76,7 @@ class Viewer:
             self.q = q
             with self._server.atomic():
                 self._web.place(self._scene.link_poses(q))
-                self._page.set_values(self._dials.values(q))
+                self.page.set_values(self._dials.values(q))
             self._newest.submit(q)
 
     def go(self, q: Array) -> None:
@@ -94,7 +100,7 @@ class Viewer:
             if self._judge.valid(q):
                 self.go(q)
                 return
-        self._page.notify(f"no valid configuration among {_DRAWS} that were drawn")
+        self.page.notify(f"no valid configuration among {_DRAWS} that were drawn")
 
     def see_through(self, wanted: bool) -> None:
         """Make obstacles transparent, or solid again."""
@@ -112,13 +118,13 @@ class Viewer:
                 self.pause()
             else:
                 self._player.play()
-                self._page.playing()
+                self.page.playing()
 
     def pause(self) -> None:
         """Stay where the path is."""
         if self._player is not None and self._player.playing:
             self._player.pause()
-            self._page.paused()
+            self.page.paused()
 
     def scrub(self, fraction: float) -> None:
         """Show the path at a fraction of its length."""
@@ -127,7 +133,7 @@ class Viewer:
                 return
             self.pause()
             self._player.fraction = fraction
-            self._page.set_fraction(fraction)
+            self.page.set_fraction(fraction)
             self.show(self._track.at(fraction))
 
     def set_pace(self, speed: float, loop: bool) -> None:
@@ -139,7 +145,7 @@ class Viewer:
         with self._lock:
             # Whoever paused it may have shown something else since.
             if self._track is not None and self._player is not None and self._player.playing:
-                self._page.set_fraction(fraction)
+                self.page.set_fraction(fraction)
                 self.show(self._track.at(fraction))
 
     def _first(self, path: Array | None) -> Array:
@@ -150,11 +156,11 @@ class Viewer:
     def _judge_shown(self, q: Array, overtaken: Callable[[], bool]) -> None:
         judgement = self._judge.verdict(q)
         if judgement.contacts is None and not overtaken():
-            self._page.report(judgement, q)
+            self.page.report(judgement, q)
             judgement = self._judge.judge(q)
         if judgement.contacts is not None:
             with self._server.atomic():
-                self._page.report(judgement, q)
+                self.page.report(judgement, q)
             with self._lock:
                 self._web.mark(judgement.contacts)
 

@@ -1,17 +1,14 @@
-"""Draws a scene on the web page: bodies, boundary, what touches, the way of a path."""
+"""Draws what is in a scene on the web page: bodies, what touches, the way of a path."""
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..contact.types import Contact
-from ..geometry.assembly import Assembly, Part
-from ..mjcf.scenery import OVERVIEW, boundary_lines
+from ..geometry.assembly import Part
 from ..simulation.scene import Scene
 from ..transforms import Array, quaternion_from_matrix
 
@@ -26,14 +23,7 @@ _LINK_TINT, _LINK_OPACITY = 0.8, 0.75
 _OBSTACLE_TINT, _OBSTACLE_OPACITY = 0.45, 0.35
 _SEE_THROUGH = 0.25
 _MARK: Colour = (122, 12, 22)
-_WIRE: Colour = (120, 128, 138)
 _TRAIL: Colour = (44, 93, 138)
-_BACKGROUND = ((244, 246, 248), (216, 224, 232))
-_FIELD_OF_VIEW = math.radians(40)
-# Room around what is seen.
-_AROUND = 1.06
-# A boundary is seen whole if it is no more than so many times as large as all bodies.
-_BOUNDARY_SEEN = 1.5
 # Of the extent.
 _MARK_RADIUS, _NORMAL_LENGTH = 0.005, 0.05
 
@@ -44,11 +34,11 @@ class WebScene:
     Args:
         server: The page.
         scene: The scene.
-        rows: (n, dim) configurations that the camera is to see.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, rows: Array) -> None:
+    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._server = server
+        self._extent = scene.extent
         assembly = scene.compiled.assembly
         self._link_names = scene.link_names
         fixed = (*assembly.obstacles, *assembly.surfaces)
@@ -59,14 +49,6 @@ class WebScene:
         self._see_through = False
         for part in fixed:
             _place(self._meshes[part.name], part.pose)
-        lower, upper = _seen(scene, rows)
-        self._extent = assembly.extent
-        self._set_stage(lower, upper)
-        if scene.compiled.options.ground:
-            self._add_ground(assembly)
-        if assembly.environment.boundary is not None:
-            lines = np.array(boundary_lines(assembly.environment.boundary, assembly))
-            server.scene.add_line_segments("/boundary", lines, _WIRE, thickness=1.2, thickness_units="screen")
 
     def place(self, poses: Array) -> None:
         """Put the links at their world poses, (nlinks, 4, 4)."""
@@ -111,14 +93,6 @@ class WebScene:
             side="double",
         )  # fmt: skip
 
-    def _add_ground(self, assembly: Assembly) -> None:
-        x, y, _ = (assembly.lower + assembly.upper) / 2
-        size = 2 * self._extent
-        self._server.scene.add_grid(
-            "/ground", size, size, cell_size=size / 40, section_size=size / 8, cell_color=_WIRE,
-            section_color=_WIRE, position=(x, y, assembly.lower[2]),
-        )  # fmt: skip
-
     def _add_spheres(self, name: str, places: Array) -> None:
         import trimesh
 
@@ -138,60 +112,6 @@ class WebScene:
             else:
                 handle.color = colour
                 handle.opacity = _SEE_THROUGH if self._see_through and name in self._fixed else None
-
-    def _set_stage(self, lower: Array, upper: Array) -> None:
-        """Place the camera where the MJCF's `overview` stands, as near as it sees a whole box; light and background."""
-        # The shadows of the page reach 20 units from the camera, whatever the size of the scene.
-        self._server.scene.configure_default_lights(cast_shadow=False)
-        # A sky of one colour instead of a photograph, which browsers without a GPU prepare for seconds.
-        self._server.scene.configure_environment_map(None)
-        self._server.scene.add_light_hemisphere(
-            "/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=1.5
-        )
-        # From the side, so that walls at right angles differ.
-        self._server.scene.add_light_directional("/lamp", intensity=0.9, position=(1.0, -0.35, 0.3))
-        center, back = (lower + upper) / 2, np.array(OVERVIEW) / np.linalg.norm(OVERVIEW)
-        distance = _distance(lower - center, upper - center, back)
-        camera = self._server.initial_camera
-        camera.fov = _FIELD_OF_VIEW
-        camera.near, camera.far = distance / 1000, distance * 100
-        camera.position, camera.look_at, camera.up = center + distance * back, center, (0.0, 0.0, 1.0)
-        above, below = (np.array(c, dtype=np.float64) for c in _BACKGROUND)
-        share = np.linspace(0, 1, 64)[:, None, None]
-        gradient = ((1 - share) * above + share * below).round().astype(np.uint8)
-        self._server.scene.set_background_image(np.repeat(gradient, 2, axis=1), format="png")
-
-
-def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
-    """Return the corners of a box around bodies at home, links at some configurations, and a boundary of like size."""
-    assembly = scene.compiled.assembly
-    lower, upper = assembly.lower, assembly.upper
-    if len(rows) and scene.link_names:
-        poses = scene.link_poses(rows)
-        for i, part in enumerate(p for r in assembly.robots for p in r.links):
-            corners = _corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
-            world = np.einsum("nij,cj->nci", poses[:, i, :3, :3], corners) + poses[:, i, None, :3, 3]
-            lower, upper = np.minimum(lower, world.min(axis=(0, 1))), np.maximum(upper, world.max(axis=(0, 1)))
-    if assembly.environment.boundary is not None:
-        wires = np.array(boundary_lines(assembly.environment.boundary, assembly)).reshape(-1, 3)
-        low, high = np.minimum(lower, wires.min(axis=0)), np.maximum(upper, wires.max(axis=0))
-        if np.linalg.norm(high - low) <= _BOUNDARY_SEEN * np.linalg.norm(upper - lower):
-            return low, high
-    return lower, upper
-
-
-def _distance(lower: Array, upper: Array, back: Array) -> float:
-    """Return from how far a square picture holds a box about the origin, seen from the direction `back`."""
-    right = np.cross((0.0, 0.0, 1.0), back)
-    right /= np.linalg.norm(right)
-    corners = _corners(lower, upper)
-    aside = np.abs(corners @ np.stack([right, np.cross(back, right)], axis=1)).max(axis=1)
-    return _AROUND * float(np.max(aside / math.tan(_FIELD_OF_VIEW / 2) + corners @ back))
-
-
-def _corners(lower: Array, upper: Array) -> Array:
-    """Return the corners of a box, (8, 3)."""
-    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
 
 
 def _colour(scene: Scene, part: Part) -> Colour:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from ..contact.types import Contact
 from ..simulation.scene import Scene
-from ..simulation.verdicts import deepest
 from ..transforms import Array
 from .judging import Judgement
 
@@ -61,8 +60,16 @@ def _touches(contacts: Sequence[Contact] | None) -> list[str]:
     return [
         f"<b>{text(c.link)}</b> and <b>{text(c.other)}</b> "
         f'<span style="color:{_DIM}">({c.kind})</span> {_depth(c.distance)}'
-        for c in deepest(contacts)
+        for c in _deepest(contacts)
     ]
+
+
+def _deepest(contacts: Sequence[Contact]) -> list[Contact]:
+    """Return one contact of each pair: the first, for the deepest come first."""
+    found: dict[tuple[str, str], Contact] = {}
+    for contact in contacts:
+        found.setdefault((contact.link, contact.other), contact)
+    return list(found.values())
 
 
 def _depth(distance: float) -> str:
