@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -132,15 +132,17 @@ class Tab:
         return self.page.inner_text("#reasons").splitlines()
 
     def picture(self) -> np.ndarray:
-        """Return what the drawing shows, (h, w, 3) uint8, once it has come to rest."""
+        """Return what the drawing shows, (h, w, 3) uint8."""
         from PIL import Image
 
-        before = None
-        for _ in range(20):
-            shot = self.page.screenshot(clip={"x": 0, "y": 160, "width": 400, "height": 400})
-            now = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))
-            if before is not None and np.array_equal(before, now):
-                return now
-            before = now
+        shot = self.page.screenshot(clip={"x": 0, "y": 160, "width": 400, "height": 400})
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))
+
+    def wait_picture(self, wanted: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """Wait until the drawing, which lags behind the words, is as wanted, and return it."""
+        for _ in range(100):
+            picture = self.picture()
+            if wanted(picture):
+                return picture
             self.page.wait_for_timeout(100)
-        raise AssertionError("the drawing does not come to rest")
+        raise AssertionError("the drawing never becomes what it should be")

@@ -159,9 +159,8 @@ class Viewer:
             self.page.report(judgement, q)
             judgement = self._judge.judge(q)
         if judgement.contacts is not None:
-            with self._server.atomic():
+            with self._lock, self._server.atomic():
                 self.page.report(judgement, q)
-            with self._lock:
                 self._web.mark(judgement.contacts)
 
 
