@@ -28,6 +28,7 @@ VERBS = {
     "batch": ("batch", "Batch", "write verdicts on files of configurations, larger than memory if need be"),
     "render": ("render", "Render", "draw a scene into a PNG file, without a screen"),
     "play": ("play", "Play", "film robots that follow a path"),
+    "view": ("view", "View", "show a scene on a web page: sliders, live contacts, paths that play"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 
@@ -43,6 +44,7 @@ examples:
   env2mjcf convert scene.env out/                 out/scene.xml, for MuJoCo
   env2mjcf check scene.env --query scene.query    are start and goal free
   env2mjcf batch scene.env q.npy -o hits.npy      millions of verdicts
+  env2mjcf view scene.env                         a page with sliders
   env2mjcf lint scenes/                           what is doubtful in a folder
   env2mjcf convert --help                         all options of a verb
 

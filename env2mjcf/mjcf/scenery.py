@@ -13,6 +13,8 @@ from .boundary import add_walls, add_wires
 from .writer import Element, add, comment, number, numbers
 
 _STANDARD_GRAVITY = 9.80665
+OVERVIEW = (0.55, -1.0, 0.75)
+"""Where the camera `overview` stands, seen from the scene: in front, to the right and above."""
 
 
 def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
@@ -111,7 +113,7 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
 
 def _camera(center: Array, extent: float) -> dict[str, str]:
     """Look at the whole scene from the front right and above."""
-    back = np.array([0.55, -1.0, 0.75])
+    back = np.array(OVERVIEW)
     back /= np.linalg.norm(back)
     right = np.cross((0, 0, 1), back)
     right /= np.linalg.norm(right)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mjcf.scenery import OVERVIEW
 from ..transforms import Array
 
 # Vertical field of view in radians: narrow, so that parallels stay nearly so.
@@ -47,7 +48,8 @@ class Viewpoint:
     forward: tuple[float, float, float]
 
 
-_OVERVIEW = Direction(2.0735, -0.5815)
+# As the camera of that name in the MJCF.
+_OVERVIEW = Direction(math.atan2(-OVERVIEW[1], -OVERVIEW[0]), -math.atan2(OVERVIEW[2], math.hypot(*OVERVIEW[:2])))
 _NAMED = {
     "overview": _OVERVIEW,
     "front": Direction(math.pi / 2, -0.2),
