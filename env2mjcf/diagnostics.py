@@ -162,4 +162,7 @@ CATALOGUE: dict[str, str] = {
     "CFG507": "Velocities or info fields behind configurations are not used.",
     "CFG508": "A query holds one configuration only.",
     "CFG509": "The output of a batch cannot be written.",
+    "CFG540": "There is no task to plan.",
+    "CFG541": "A task to plan has no goal.",
+    "CFG542": "A planned path cannot be written.",
 }

@@ -25,6 +25,7 @@ VERBS = {
     "check": ("check", "Check", "tell whether configurations are valid, and who touches whom"),
     "lint": ("lint", "Lint", "list everything doubtful in scenes, robots and meshes"),
     "batch": ("batch", "Batch", "write verdicts on files of configurations, larger than memory if need be"),
+    "plan": ("plan", "Plan", "find a way from start to goal, prove it, and write it as a path"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 
@@ -40,6 +41,7 @@ examples:
   env2mjcf convert scene.env out/                 out/scene.xml, for MuJoCo
   env2mjcf check scene.env --query scene.query    are start and goal free
   env2mjcf batch scene.env q.npy -o hits.npy      millions of verdicts
+  env2mjcf plan scene.env --query scene.query     a way from start to goal
   env2mjcf lint scenes/                           what is doubtful in a folder
   env2mjcf convert --help                         all options of a verb
 
