@@ -14,7 +14,7 @@ HERE = Path(__file__).resolve().parent
 # The checkout's code is what is described, whatever is installed.
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-import generated
+import generated  # noqa: E402
 
 project = "env2mjcf"
 author = "the authors of env2mjcf"
@@ -83,12 +83,8 @@ def on_source(app: Sphinx, docname: str, content: list[str]) -> None:
     """Put in what is generated, and turn links to files of the checkout into links to pages."""
     text = with_site_links(content[0], PurePosixPath("docs", docname).parent)
     # A page of another feature, which may not be here yet.
-    text = re.sub(
-        r"^\?(.+)$",
-        lambda m: m[1] if (HERE / docname).with_name(f"{m[1]}.md").exists() else "",
-        text,
-        flags=re.MULTILINE,
-    )
+    beside = (HERE / docname).parent
+    text = re.sub(r"^\?(\w+)$", lambda m: m[1] if (beside / f"{m[1]}.md").exists() else "", text, flags=re.MULTILINE)
     content[0] = re.sub(r"^<!-- generated: (\w+) -->$", lambda m: generated.PARTS[m[1]](), text, flags=re.MULTILINE)
 
 
@@ -98,7 +94,14 @@ def on_include(app: Sphinx, relative_path: Path, parent_docname: str, content: l
     content[0] = with_site_links(content[0], PurePosixPath(path.as_posix()).parent)
 
 
+def on_docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Keep napoleon from taking what stands before a colon for the type of a property."""
+    if what in ("attribute", "property"):
+        lines.insert(0, "")
+
+
 def setup(app: Sphinx) -> None:
-    """Connect both."""
+    """Connect these."""
     app.connect("source-read", on_source)
     app.connect("include-read", on_include)
+    app.connect("autodoc-process-docstring", on_docstring, priority=400)

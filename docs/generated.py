@@ -9,13 +9,16 @@ import subprocess
 import sys
 from collections.abc import Callable
 from inspect import getdoc
+from os import PathLike
 from pathlib import Path
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from env2mjcf.cli.main import VERBS
 from env2mjcf.options import Limits, Options
 
 ROOT = Path(__file__).resolve().parent.parent
-WIDTH = 100
+WIDTH = 90
 
 
 def options() -> str:
@@ -39,8 +42,9 @@ def verbs() -> str:
 def _table(described: type, head: str) -> str:
     meanings = _attributes(described)
     values = described()
+    hints = get_type_hints(described)
     rows = [
-        f"| `{f.name}` | {_code(f.type)} | {_code(_default(getattr(values, f.name)))} | {meanings[f.name]} |"
+        f"| `{f.name}` | {_kind(hints[f.name])} | {_code(_default(getattr(values, f.name)))} | {meanings[f.name]} |"
         for f in dataclasses.fields(described)
     ]
     return "\n".join([f"| {head} | type | default | meaning |", "|---|---|---|---|", *rows])
@@ -49,10 +53,24 @@ def _table(described: type, head: str) -> str:
 def _attributes(described: type) -> dict[str, str]:
     """Return what a class's docstring says of its attributes."""
     text = (getdoc(described) or "").split("Attributes:\n")[1]
-    return {
-        name: " ".join(meaning.split())
-        for name, meaning in re.findall(r"^ +(\w+): (.+(?:\n {8,}.+)*)", text, re.MULTILINE)
-    }
+    found = re.findall(r"^ +(\w+): (.+(?:\n {8,}.+)*)", text, re.MULTILINE)
+    return {name: " ".join(meaning.split()) for name, meaning in found}
+
+
+def _kind(hint: Any) -> str:
+    """Return what an option can be, in words; alternatives by commas."""
+    parts = get_args(hint)
+    if get_origin(hint) is Literal:
+        return ", ".join(_code(repr(value)) for value in parts)
+    if PathLike in map(get_origin, parts):
+        return "path" if NoneType not in parts else "path, `None`"
+    if NoneType in parts:
+        return f"{', '.join(_kind(part) for part in parts if part is not NoneType)}, `None`"
+    if get_origin(hint) is tuple and Ellipsis in parts:
+        return f"any number of: {_kind(parts[0])}"
+    if get_origin(hint) is tuple:
+        return ", ".join(_kind(part) for part in parts)
+    return _code(hint.__name__)
 
 
 def _default(value: object) -> str:
