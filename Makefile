@@ -38,6 +38,7 @@ wheel: $(VENV)/dev.stamp  ## build the wheel into dist/
 tables: $(VENV)/dev.stamp  ## make the tables of README.md, benchmarks/ and docs/ anew
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python docs/diagnostics.py
+	$(BIN)/python docs/figures/connection.py
 
 pictures: $(VENV)/dev.stamp  ## draw the pictures in docs/ anew
 	$(BIN)/python models/demo.py --gallery docs/models.png

@@ -42,6 +42,25 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     follow(page, tmp_path)
 
 
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a checkout of git")
+def test_a_newcomer_gets_through_the_tutorial(tmp_path: Path) -> None:
+    clone = tmp_path / "env2mjcf"
+    subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
+    install(clone)
+    follow(TUTORIAL, clone)
+
+
+def install(clone: Path) -> None:
+    """Make this interpreter's environment the clone's, as `make` would in some minutes."""
+    venv = clone / ".venv"
+    venv.mkdir()
+    for part in ("bin", "lib", "include", "pyvenv.cfg"):
+        if (source := Path(sys.prefix) / part).exists():
+            (venv / part).symlink_to(source)
+    # Newer than pyproject.toml, so that nothing is installed anew.
+    (venv / "view.stamp").touch()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_a_page_says_why_an_example_is_not_run(page: Path) -> None:
     for block in blocks(page.read_text(encoding="utf-8")):
@@ -57,6 +76,11 @@ def test_every_public_name_is_described() -> None:
     public = {n for n, value in ((n, getattr(env2mjcf, n)) for n in dir(env2mjcf)) if callable(value) and n[0] != "_"}
     public -= {"import_module", "Any"}
     assert {n for n in public if not re.search(rf":: (env2mjcf\.)?{n}\n", described)} == set()
+
+
+def test_the_picture_of_a_connection_is_what_its_script_draws() -> None:
+    done = subprocess.run([sys.executable, DOCS / "figures" / "connection.py", "--check"], check=False)
+    assert done.returncode == 0, "run `make tables`"
 
 
 def test_the_page_of_diagnostics_lists_every_code() -> None:
