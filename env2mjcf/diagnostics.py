@@ -189,4 +189,7 @@ CATALOGUE: dict[str, str] = {
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
+    "CFG540": "There is no task to plan.",
+    "CFG541": "A task to plan has no goal.",
+    "CFG542": "A planned path cannot be written.",
 }

@@ -155,9 +155,18 @@ class ConfigurationSpace:
             q[..., x + 3], q[..., x + 4], q[..., x + 5] = angles_from_quaternion(_unit(quaternion))
         return q
 
+    def sample(self, n: int, seed: int) -> Array:
+        """Draw n configurations uniformly between the limits, (n, dim); equal seeds give equal draws.
+
+        A degree of freedom without limits is drawn from the box of the obstacles grown by the robots' radius, or
+        from twice that radius where there are no obstacles.
+        """
+        lower, upper = self.sample_limits
+        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+
     @property
-    def ranges(self) -> tuple[Array, Array]:
-        """Finite ends, (dim,) each, that `sample` draws between: the limits where there are any."""
+    def sample_limits(self) -> tuple[Array, Array]:
+        """The finite limits that `sample` draws between, (dim,) each."""
         box_lower, box_upper = self._sample_box
         lower, upper = self.lower.copy(), self.upper.copy()
         half = float(np.max(box_upper - box_lower)) / 2
@@ -169,15 +178,6 @@ class ConfigurationSpace:
             if not np.isfinite(upper[i]):
                 upper[i] = high if high > lower[i] else lower[i] + 2 * half
         return lower, upper
-
-    def sample(self, n: int, seed: int) -> Array:
-        """Draw n configurations uniformly between the limits, (n, dim); equal seeds give equal draws.
-
-        A degree of freedom without limits is drawn from the box of the obstacles grown by the robots' radius, or
-        from twice that radius where there are no obstacles.
-        """
-        lower, upper = self.ranges
-        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
 
     def interpolate(self, q0: ArrayLike, q1: ArrayLike, n: int) -> Array:
         """Return n configurations on the straight way from q0 to q1, (n, dim), both ends included.

@@ -29,6 +29,7 @@ VERBS = {
     "render": ("render", "Render", "draw a scene into a PNG file, without a screen"),
     "play": ("play", "Play", "film robots that follow a path"),
     "view": ("view", "View", "show a scene on a web page: sliders, live contacts, paths that play"),
+    "plan": ("plan", "Plan", "find a way from start to goal, prove it, and write it as a path"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 
@@ -45,6 +46,7 @@ examples:
   env2mjcf check scene.env --query scene.query    are start and goal free
   env2mjcf batch scene.env q.npy -o hits.npy      millions of verdicts
   env2mjcf view scene.env                         a page with sliders
+  env2mjcf plan scene.env --query scene.query     a way from start to goal
   env2mjcf lint scenes/                           what is doubtful in a folder
   env2mjcf convert --help                         all options of a verb
 

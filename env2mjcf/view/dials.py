@@ -53,7 +53,7 @@ class Dials:
     def __init__(self, scene: Scene, rows: Array) -> None:
         space = scene.space
         self._space = space
-        lower, upper = space.ranges
+        lower, upper = space.sample_limits
         shown = np.vstack([space.home[None], rows])
         self._low = space.encode(np.minimum(lower, shown.min(axis=0)))
         self._high = space.encode(np.maximum(upper, shown.max(axis=0)))
