@@ -89,6 +89,12 @@ def test_sliders_and_configurations_are_each_other_back(cube: Scene) -> None:
     assert dials.configuration([float("nan")] * 6) is None
 
 
+def test_an_angle_that_turns_without_end_stays_on_its_slider(cube: Scene) -> None:
+    dials = Dials(cube, NOTHING)
+    turned = np.array([0, 0, 0, 2 * np.pi, 3 * np.pi, -2.25 * np.pi])
+    np.testing.assert_allclose(dials.values(turned)[3:], [0, -1, -0.25], atol=1e-12)
+
+
 # Words.
 
 
