@@ -161,6 +161,12 @@ class ConfigurationSpace:
         A degree of freedom without limits is drawn from the box of the obstacles grown by the robots' radius, or
         from twice that radius where there are no obstacles.
         """
+        lower, upper = self.sample_limits
+        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+
+    @property
+    def sample_limits(self) -> tuple[Array, Array]:
+        """The finite limits that `sample` draws between, (dim,) each."""
         box_lower, box_upper = self._sample_box
         lower, upper = self.lower.copy(), self.upper.copy()
         half = float(np.max(box_upper - box_lower)) / 2
@@ -171,7 +177,7 @@ class ConfigurationSpace:
                 lower[i] = low if np.isinf(upper[i]) else min(low, upper[i] - 2 * half)
             if not np.isfinite(upper[i]):
                 upper[i] = high if high > lower[i] else lower[i] + 2 * half
-        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+        return lower, upper
 
     def interpolate(self, q0: ArrayLike, q1: ArrayLike, n: int) -> Array:
         """Return n configurations on the straight way from q0 to q1, (n, dim), both ends included.

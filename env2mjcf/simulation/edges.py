@@ -91,6 +91,22 @@ class EdgeAnswers(Asking):
         queries = self._queries
         return check_path(path, queries.steps, queries.validities, queries.contacts, self.space, resolution)
 
+    def step(self, resolution: float | None = None) -> float:
+        """Return the step in metres that a resolution means: itself, else the file's PositionRes, else 0.01 extent.
+
+        Raises:
+            ValueError: The resolution is not positive.
+        """
+        return self._queries.steps.resolution(resolution)
+
+    def edge_rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None) -> Array:
+        """Return the configurations that `edge_in_collision` looks at on one edge, both ends included, (n, dim).
+
+        Raises:
+            ValueError: q0 or q1 is no configuration, or the resolution is not positive.
+        """
+        return self._queries.steps.rows(q0, q1, resolution)
+
     def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
         """Return where ways begin, and where they lead from there."""
         start, end = self.space.check(q0), self.space.check(q1)

@@ -1,0 +1,208 @@
+"""`env2mjcf plan`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import tyro
+from rich.text import Text
+from tyro.conf import Positional
+
+from ..errors import ConversionError, DiagnosticLog, FormatError
+from ..options import Options, PathArgument
+from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .printing import one_line, print_diagnostics, print_json, print_parts, working
+
+if TYPE_CHECKING:
+    from ..planning.result import Plan as Result
+    from ..simulation.scene import Query, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Plan a way from the start to the goal of a query, and write it as a path file.
+
+    The robot of the query moves, the others stay at home. A query of more than two configurations is planned leg by
+    leg. A solution is made shorter, and each of its edges is looked at in fine steps and, wherever it keeps 1e-5 of the
+    scene's extent away from everything, proved to be free. The path file holds configurations no farther apart than
+    the resolution, corners included, so that it plays smoothly; --corners writes just the corners.
+
+    Without a solution in time the exit status is 1, and the best approach, from the start to what came nearest to the
+    goal, is written beside the output: out.approach.path for out.path. A start or goal that is not valid is a finding,
+    too: it is said who touches, and nothing is written.
+
+    Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT. All are OMPL's.
+    auto takes turns: RRTConnect and KPIECE. RRTstar and PRMstar use all of the time.
+
+    Examples:
+      env2mjcf plan maze.env --robots maze.robot --query maze.query -o maze.path
+      env2mjcf plan alpha.env --query alpha.query --planner KPIECE --time 120 -o alpha.path
+      env2mjcf plan problem.xml --json
+
+    Attributes:
+        scene: An env file, an XML environment or a problem XML.
+        out: The path file to write; none is written without.
+        planner: Who plans.
+        time: Seconds after which to give up.
+        seed: Of the random numbers; equal seeds give equal paths, unless time runs out.
+        resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner;
+            otherwise the file's PositionRes, else 0.01 of the extent.
+        corners: Write just the corners of the path.
+        shorten: Make the path shorter.
+        task: Which task of the query, counted from 1, where there are several.
+        output: How to report.
+        options: What may be chosen.
+    """
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
+    out: Annotated[PathArgument | None, tyro.conf.arg(aliases=["-o"])] = None
+    planner: str = "auto"
+    time: float = 60.0
+    seed: int = 0
+    resolution: float | None = None
+    corners: bool = False
+    shorten: bool = True
+    task: int = 1
+    output: OutputFlags = field(default_factory=Output)
+    options: OptionFlags = field(default_factory=Options)
+
+    def run(self) -> int:
+        """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
+        from ..planning.names import known
+        from ..planning.planning import plan_through
+        from ..simulation.preparing import load
+
+        known(self.planner)
+        _refuse(self.out)
+        with working(f"loading {self.scene}"):
+            scene = load(self.scene, **keywords(self.options))
+        log = DiagnosticLog(self.options.strict)
+        log.extend(scene.diagnostics)
+        query = self._query(scene, log)
+        print_diagnostics(log, self.output.verbose)
+        if (wrong := _wrong(scene, query)) is not None:
+            self._say_wrong(wrong)
+            return 1
+        from .planning_meter import PlanningMeter
+
+        with PlanningMeter(self.time) as meter:
+            result = plan_through(
+                scene, query.q, planner=self.planner, robot=query.robot, time=self.time, seed=self.seed,
+                resolution=self.resolution, shorten=self.shorten, progress=meter.at,
+            )  # fmt: skip
+        written = self._write(scene, query.robot, result)
+        if self.output.json:
+            print_json(_summary(scene, result, written))
+        else:
+            print_parts(_lines(result, written))
+        return 0 if result.solved else 1
+
+    def _query(self, scene: Scene, log: DiagnosticLog) -> Query:
+        """Return the task that is to be planned.
+
+        Raises:
+            FormatError: There is none, or it has no goal.
+            ValueError: There are not so many.
+        """
+        tasks = scene.queries
+        if not tasks:
+            log.fail(
+                FormatError, "CFG540", self.scene, "there is no task: no start, and no goal",
+                hint="give a query file: --query FILE",
+            )  # fmt: skip
+        if not 1 <= self.task <= len(tasks):
+            raise ValueError(f"--task {self.task}: there are {len(tasks)} tasks, counted from 1")
+        task = tasks[self.task - 1]
+        if len(task.q) < 2:
+            log.fail(
+                FormatError, "CFG541", self.scene, "the task holds one configuration; expected a start and a goal",
+                hint="add the goal to the query file",
+            )  # fmt: skip
+        return task
+
+    def _write(self, scene: Scene, robot: int, result: Result) -> Path | None:
+        from ..companions import write_path
+
+        if self.out is None:
+            return None
+        out = Path(self.out)
+        if not result.solved:
+            out = out.with_name(f"{out.stem}.approach.path")
+        q = result.path if self.corners else dense(scene, result)
+        return write_path(scene, q, out, robot)
+
+    def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]]) -> None:
+        if self.output.json:
+            print_json({"solved": False, "invalid": dict(wrong)})
+            return
+        parts: list[Text] = []
+        for label, reasons in wrong:
+            parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
+            parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
+        print_parts(parts)
+
+
+def _refuse(out: PathArgument | None) -> None:
+    """Refuse what cannot be written before time is spent on it."""
+    if out is None:
+        return
+    path = Path(out)
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a folder" if path.is_dir() else f"lies in {path.parent}, which is no folder"
+        DiagnosticLog().fail(
+            ConversionError, "CFG542", str(path), f"{path} {what}; expected a file to write", hint="name another output"
+        )
+
+
+def dense(scene: Scene, result: Result) -> np.ndarray:
+    """Return configurations on the path no farther apart than its resolution, corners included, (n, dim)."""
+    rows = [result.path[:1]]
+    for a, b in zip(result.path[:-1], result.path[1:], strict=True):
+        rows.append(scene.edge_rows(a, b, result.resolution)[1:-1])
+        rows.append(b[None])
+    return np.concatenate(rows)
+
+
+def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
+    """Return which configurations of the query are not valid, and why; None if all are."""
+    from ..planning.planning import names_of
+    from ..simulation.verdicts import Judge
+
+    judge = Judge(scene, query.q, names_of(len(query.q)))
+    found = [judge.verdict(int(i)) for i in np.flatnonzero(~judge.valid)]
+    return [(v.label, v.reasons()) for v in found] or None
+
+
+def _lines(result: Result, written: Path | None) -> Iterator[Text]:
+    if result.solved:
+        yield Text.assemble(("solved", "bold green"), f" by {result.planner} in {result.seconds:.2f} s")
+    else:
+        yield Text.assemble(("not solved", "bold red"), f" by {result.planner} in {result.seconds:.2f} s")
+    yield Text(f"checks: {result.checks:,} configurations, {result.checks_per_second:,.0f} a second")
+    what = "path" if result.solved else "best approach"
+    yield Text(f"{what}: {len(result.path)} configurations, length {result.length:.6g} m")
+    if not result.solved:
+        yield Text(f"left to the goal: {result.left:.6g} m")
+    yield Text(f"certified edges: {int(result.certified.sum())} of {len(result.certified)}")
+    if not result.certified.all():
+        bad = ", ".join(str(i + 1) for i in np.flatnonzero(~result.certified)[:10])
+        verdict = "valid" if result.dense.all() else "not all valid"
+        yield Text(
+            f"    not certified, because bodies come nearer than 1e-5 of the extent or touch: edge {bad}; at steps of "
+            f"{result.fine_step:.3g} m all edges are {verdict}"
+        )
+    if written is not None:
+        yield Text(f"written: {one_line(str(written))}")
+
+
+def _summary(scene: Scene, result: Result, written: Path | None) -> dict[str, object]:
+    values: dict[str, object] = {f.name: getattr(result, f.name) for f in dataclasses.fields(result)}
+    values["checks_per_second"] = result.checks_per_second
+    values["dofs"] = scene.space.names
+    values["file"] = written
+    return values

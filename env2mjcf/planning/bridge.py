@@ -1,0 +1,196 @@
+"""OMPL's view of a scene: its state space, its validators and its planners. Imports OMPL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from ompl import base, geometric, util
+
+from ..transforms import Array, wrap
+from .names import OMPL_PLANNERS
+from .space import PlanningSpace
+from .validity import Validity
+
+
+class _Layout:
+    """Where each degree of freedom stands in a state of OMPL."""
+
+    def __init__(self, space: PlanningSpace) -> None:
+        self._dim = space.dim
+        self.reals = [(i, p.columns) for i, p in enumerate(space.pieces) if not p.turns]
+        self._circles = [(i, p.columns[0]) for i, p in enumerate(space.pieces) if p.turns]
+
+    def read(self, state: Any) -> Array:
+        """Return the configuration of a state, (d,)."""
+        values = np.empty(self._dim)
+        for i, columns in self.reals:
+            part = state[i]
+            for k, column in enumerate(columns):
+                values[column] = part[k]
+        for i, column in self._circles:
+            values[column] = state[i].value
+        return values
+
+    def write(self, state: Any, values: Array) -> None:
+        """Put a configuration, (d,), into a state."""
+        for i, columns in self.reals:
+            for k, column in enumerate(columns):
+                state[i][k] = float(values[column])
+        for i, column in self._circles:
+            state[i].value = float(wrap(values[column]))
+
+
+class _First(base.ProjectionEvaluator):
+    """Projects onto the first degrees of freedom, three at the most, each by its lever."""
+
+    def __init__(self, states: Any, layout: _Layout, weights: Array) -> None:
+        super().__init__(states)
+        # No reference to the space itself, which holds this one: OMPL's objects would never be freed.
+        self._read, self._weights = layout.read, weights[:3]
+
+    def getDimension(self) -> int:
+        """Return the number of dimensions of the projection."""
+        return len(self._weights)
+
+    def defaultCellSizes(self) -> None:
+        """Leave it to OMPL to find them from samples."""
+
+    def project(self, state: Any, projection: Any) -> None:
+        """Project a state."""
+        projection[:] = self._read(state)[: len(self._weights)] * self._weights
+
+
+def state_space(space: PlanningSpace) -> tuple[Any, _Layout]:
+    """Return a state space of OMPL with the topology of a scene, and where its states hold what.
+
+    The position of a base, and every joint with limits, is a real vector space with bounds; every angle without limits
+    is a circle (SO2). The distance is that of `PlanningSpace`.
+    """
+    states = base.CompoundStateSpace()
+    for piece in space.pieces:
+        states.addSubspace(base.SO2StateSpace() if piece.turns else _interval(space, piece.columns), piece.weight)
+    states.lock()
+    layout = _Layout(space)
+    # The cells that KPIECE fills: of the position of a base, else of the first joints.
+    bases = [i for i, columns in layout.reals if len(columns) > 1]
+    projection = base.SubspaceProjectionEvaluator(states, bases[0]) if bases else _First(states, layout, space.weights)
+    states.registerDefaultProjection(projection)
+    return states, layout
+
+
+class _Motions(base.MotionValidator):
+    """Answers about motions, and about states for who asks for those."""
+
+    def __init__(self, information: Any, read: Callable[[Any], Array], validity: Validity) -> None:
+        super().__init__(information)
+        self._read, self._validity = read, validity
+        self.poll: Callable[[], None] = _nothing
+
+    def checkMotion(self, start: Any, end: Any, *_: Any) -> bool:
+        """Return whether a motion is valid."""
+        self.poll()
+        return self._validity.motion(self._read(start), self._read(end))
+
+    def is_valid(self, state: Any) -> bool:
+        """Return whether a state is valid."""
+        self.poll()
+        return bool(self._validity.states(self._read(state)[None])[0])
+
+
+def _nothing() -> None:
+    pass
+
+
+class OmplRun:
+    """One planner at work on one pair of configurations.
+
+    Args:
+        space: What moves.
+        validity: Who answers.
+        planner: One of `OMPL_PLANNERS`.
+        start: (d,).
+        goal: (d,).
+        seed: Of OMPL's random numbers.
+    """
+
+    def __init__(
+        self, space: PlanningSpace, validity: Validity, planner: str, start: Array, goal: Array, seed: int
+    ) -> None:
+        self.validity = validity
+        util.setLogLevel(util.LOG_NONE)
+        # Zero is no seed for OMPL.
+        util.RNG.setSeed(seed + 1)
+        self._space, self._goal = space, goal
+        states, self._layout = state_space(space)
+        self._information = base.SpaceInformation(states)
+        self._motions = _Motions(self._information, self._layout.read, validity)
+        self._information.setStateValidityChecker(self._motions.is_valid)
+        self._information.setMotionValidator(self._motions)
+        self._information.setup()
+        self._problem = base.ProblemDefinition(self._information)
+        ends = [self._information.allocState() for _ in range(2)]
+        for state, q in zip(ends, (start, goal), strict=True):
+            self._layout.write(state, q)
+        self._problem.setStartAndGoalStates(ends[0], ends[1])
+        self._planner = getattr(geometric, OMPL_PLANNERS[planner])(self._information)
+        self._planner.setProblemDefinition(self._problem)
+        self._planner.setup()
+
+    def solve(self, stop: Callable[[], bool]) -> bool:
+        """Plan until there is a solution, or until it is to stop; return whether there is one."""
+        # The condition itself must not be Python code: PRM asks it in a thread of its own, and would wait forever for
+        # the one that is in here. Whoever asks for a verdict looks at the clock instead.
+        condition = base.plannerNonTerminatingCondition()
+
+        def poll() -> None:
+            if stop():
+                condition.terminate()
+
+        self._motions.poll = poll
+        try:
+            self._planner.solve(condition)
+        finally:
+            self._motions.poll = _nothing
+        return self._problem.hasExactSolution()
+
+    def path(self) -> Array | None:
+        """Return the solution, or else the way to what came nearest to the goal, (k, d); None without any."""
+        path: Any = self._problem.getSolutionPath()
+        if path is not None and path.getStateCount():
+            return np.array([self._layout.read(path.getState(i)) for i in range(path.getStateCount())])
+        return self._approach()
+
+    def _approach(self) -> Array | None:
+        """Return the way to what came nearest to the goal, of all that is joined to the start."""
+        data = base.PlannerData(self._information)
+        self._planner.getPlannerData(data)
+        if not data.numStartVertices():
+            return None
+        first = data.getStartIndex(0)
+        before: dict[int, int] = {first: first}
+        waiting = [first]
+        while waiting:
+            at = waiting.pop()
+            for to in data.getEdges(at):
+                if to not in before:
+                    before[to] = at
+                    waiting.append(to)
+        rows = {i: self._layout.read(data.getVertex(i).getState()) for i in before}
+        at = min(rows, key=lambda i: self._space.distance(rows[i], self._goal))
+        way = [at]
+        while at != first:
+            at = before[at]
+            way.append(at)
+        return np.array([rows[i] for i in reversed(way)])
+
+
+def _interval(space: PlanningSpace, columns: tuple[int, ...]) -> Any:
+    bounds = base.RealVectorBounds(len(columns))
+    for k, column in enumerate(columns):
+        bounds.setLow(k, float(space.lower[column]))
+        bounds.setHigh(k, float(space.upper[column]))
+    reals = base.RealVectorStateSpace(len(columns))
+    reals.setBounds(bounds)
+    return reals

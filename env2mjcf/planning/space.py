@@ -1,0 +1,147 @@
+"""The degrees of freedom that a planner moves: their topology, their limits, and how far apart configurations are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.motion import MotionBounds
+from ..dofs import DofKind
+from ..simulation.scene import Scene
+from ..transforms import Array
+
+_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+# What moves nothing (a degree of freedom that only closes a loop) weighs this part of what moves most: its way counts
+# for hardly anything, and yet configurations that differ in it are not the same.
+_LEAST = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Degrees of freedom that belong together: the position of a base, or a single angle or slide.
+
+    Attributes:
+        columns: Which, among those that move.
+        turns: Whether it is an angle that turns without end.
+        weight: How far a point of the robot moves for a unit of it, at most, in metres.
+    """
+
+    columns: tuple[int, ...]
+    turns: bool
+    weight: float
+
+
+class PlanningSpace:
+    """The configurations of the robots that move; the others stay where they are.
+
+    Angles of bases and hinges without limits are circles, each for itself: an edge is the straight way in q, the short
+    way round on circles, which is the motion that the scene's queries about edges are about. (The rotations of
+    SE(3) would be another motion, whose edges no query of the scene has looked at.)
+
+    The distance of two configurations bounds how far any point of a robot moves on the way between them: translations
+    of a base count as they are, every other degree of freedom by its longest lever. Steps that are no longer than a
+    resolution in this distance pass over nothing that is thicker.
+
+    Args:
+        scene: The scene.
+        rows: (k, dim) configurations that are to be in the space, start and goal; what does not move is as in the
+            first.
+        columns: Which degrees of freedom move.
+
+    Attributes:
+        columns: (d,) which degrees of freedom move.
+        names: Their names.
+        pieces: What the space is made of.
+        lower, upper: (d,) finite limits of what is drawn.
+        turns: (d,) which are circles.
+        weights: (d,) of the distance.
+    """
+
+    def __init__(self, scene: Scene, rows: Array, columns: NDArray[np.int64]) -> None:
+        space = scene.space
+        self.columns = columns
+        self.names = tuple(space.names[c] for c in columns)
+        self.turns: NDArray[np.bool_] = space.periodic[columns]
+        lower, upper = space.sample_limits
+        inside = rows[:, columns]
+        # The origin of a base may lie outside the boundary that its vertices keep to.
+        self.lower = np.where(self.turns, -np.pi, np.minimum(lower[columns], inside.min(axis=0)))
+        self.upper = np.where(self.turns, np.pi, np.maximum(upper[columns], inside.max(axis=0)))
+        self.weights = _levers(scene)[columns]
+        place = {int(c): i for i, c in enumerate(columns)}
+        self.pieces = tuple(
+            Piece(
+                tuple(place[c] for c in group), bool(self.turns[place[group[0]]]), float(self.weights[place[group[0]]])
+            )
+            for group in _groups(scene)
+            if group[0] in place
+        )
+        self._whole_turns = np.where(self.turns, 2 * np.pi, 0.0)
+        self._bases = [p.columns for p in self.pieces if len(p.columns) > 1]
+        self._rest = self.weights.copy()
+        self._rest[[c for base in self._bases for c in base]] = 0.0
+        self._all = len(columns) == space.dim
+        self._template = rows[0].copy()
+
+    @property
+    def dim(self) -> int:
+        """Number of degrees of freedom that move."""
+        return len(self.columns)
+
+    def full(self, values: Array) -> Array:
+        """Return the scene's configurations, (n, dim), for values of what moves, (n, d)."""
+        if self._all:
+            return values
+        rows = np.tile(self._template, (len(values), 1))
+        rows[:, self.columns] = values
+        return rows
+
+    def difference(self, start: Array, end: Array) -> Array:
+        """Return the way from one to the other, (..., d): the short way round on circles."""
+        delta = end - start
+        return delta - self._whole_turns * np.floor(delta / (2 * np.pi) + 0.5)
+
+    def lengths(self, delta: Array) -> Array:
+        """Return how long ways are, (n,), for ways (n, d)."""
+        out = np.abs(delta) @ self._rest
+        for base in self._bases:
+            moved = delta[:, base]
+            out += np.sqrt(np.einsum("ij,ij->i", moved, moved))
+        return out
+
+    def distance(self, start: Array, end: Array) -> float:
+        """Return the distance of two configurations, (d,) each."""
+        return float(self.lengths(self.difference(start, end)[None])[0])
+
+    def path_length(self, values: Array) -> float:
+        """Return the length of a path, (k, d)."""
+        return float(self.lengths(self.difference(values[:-1], values[1:])).sum())
+
+    def draw(self, n: int, rng: np.random.Generator) -> Array:
+        """Draw configurations uniformly, (n, d)."""
+        return rng.uniform(self.lower, self.upper, size=(n, self.dim))
+
+
+def _levers(scene: Scene) -> Array:
+    """Return how far a point moves for a unit of each degree of freedom, at most, (dim,)."""
+    lower, upper = scene.space.sample_limits
+    bounds = MotionBounds(scene.compiled.assembly, scene.space)
+    farthest = np.tile(np.maximum(np.abs(lower), np.abs(upper)), (scene.space.dim, 1))
+    levers = bounds.links(farthest, np.eye(scene.space.dim)).max(axis=1, initial=0.0)
+    return np.maximum(levers, _LEAST * levers.max(initial=1.0))
+
+
+def _groups(scene: Scene) -> Iterator[tuple[int, ...]]:
+    """Yield the columns of each base's position together, and every other column by itself."""
+    for robot, columns in zip(scene.compiled.assembly.robots, scene.space.robot_slices, strict=True):
+        dofs = robot.kinematics.dofs
+        bases: dict[int, list[int]] = {}
+        for i, dof in enumerate(dofs):
+            if dof.connection is None and dof.kind in _TRANSLATIONS:
+                bases.setdefault(dof.body, []).append(columns.start + i)
+        yield from map(tuple, bases.values())
+        taken = {c for base in bases.values() for c in base}
+        yield from ((c,) for c in range(columns.start, columns.stop) if c not in taken)

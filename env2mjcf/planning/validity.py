@@ -1,0 +1,70 @@
+"""Which configurations and motions are valid, and how many configurations were looked at to know it."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.scene import Scene
+from ..transforms import Array
+from .space import PlanningSpace
+
+# A motion is looked at in rounds: most invalid ones show in the first few configurations, and a round costs as much
+# as some ten of them.
+_ROUND, _GROWTH = 8, 4
+
+
+class Validity:
+    """Answers a planner's questions, in batches, and counts.
+
+    Args:
+        scene: The scene.
+        space: What moves.
+        resolution: Greatest distance that any point of a robot moves between two configurations that are looked at.
+
+    Attributes:
+        checks: How many configurations were looked at.
+        motions: How many motions were asked about.
+        resolution: As above, in metres.
+    """
+
+    def __init__(self, scene: Scene, space: PlanningSpace, resolution: float) -> None:
+        self._scene, self._space = scene, space
+        self.resolution = resolution
+        self.checks = self.motions = 0
+
+    def states(self, values: Array) -> NDArray[np.bool_]:
+        """Return whether configurations, (n, d), are valid, (n,)."""
+        self.checks += len(values)
+        return self._scene.valid_rows(self._space.full(values))
+
+    def motion(self, start: Array, end: Array) -> bool:
+        """Return whether the straight way from one configuration, (d,), known to be valid, to another is."""
+        self.motions += 1
+        delta = self._space.difference(start, end)
+        steps = max(1, math.ceil(self._space.lengths(delta[None])[0] / self.resolution))
+        times = _bisecting(steps)
+        first, count = 0, _ROUND
+        while first < steps:
+            if not self.states(start + times[first : first + count] * delta).all():
+                return False
+            first, count = first + count, count * _GROWTH
+        return True
+
+
+@lru_cache(maxsize=4096)
+def _bisecting(steps: int) -> Array:
+    """Return the times 1/n to 1, (n, 1): the last, then halves, quarters, and so on: each once."""
+    indices = [steps]
+    stride = 1
+    while stride < steps:
+        stride *= 2
+    while stride > 1:
+        indices.extend(range(stride // 2, steps, stride))
+        stride //= 2
+    times = np.array(indices, dtype=np.float64)[:, None] / steps
+    times.setflags(write=False)
+    return times
