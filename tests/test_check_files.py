@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf import Roadmap
 from env2mjcf.cli.main import main
+from env2mjcf.view.offscreen import backend
 
 HEAD = "VIZMO_PATH_FILE   Path Version 2012\n1\n"
 # The cube goes along x and meets the wall, half a metre thick on either side of x = 3.
@@ -202,3 +204,26 @@ def test_wrong_usage(check) -> None:
     assert check("x.path", "--resolution", "1e-200").status == 2
     found = check("x.path", "--radians")
     assert (found.status, "units of their own" in found.err) == (2, True)
+
+
+def test_a_picture_shows_what_is_valid_in_green_and_what_is_not_in_red(check, tmp_path: Path) -> None:
+    if backend() is None:
+        pytest.skip("no pictures on this machine")
+    found = check("x.path", "--resolution", 0.1, "--picture", "x.png")
+    assert found.status == 1
+    pixels = np.asarray(Image.open(tmp_path / "x.png").convert("RGB")).astype(int)
+    assert pixels.shape == (720, 960, 3)
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    assert ((green > red + 40) & (green > blue + 25)).sum() > 200
+    assert ((red > green + 80) & (red > blue + 80)).sum() > 200
+    (tmp_path / "x.path").write_text(f"{HEAD}0\n")
+    assert check("x.path", "--picture", "empty.png").status == 0
+    assert (tmp_path / "empty.png").exists()
+
+
+def test_a_picture_that_cannot_be_drawn_is_one_sentence(check, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    found = check("x.path", "--picture", "x.png")
+    assert found.status == 2
+    assert "pictures are switched off by MUJOCO_GL" in found.err
+    assert check("x.path", "--picture", "x.jpg").status == 2
