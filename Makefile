@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format wheel tables pictures clean
+.PHONY: help demo test lint format docs wheel tables pictures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -29,18 +29,22 @@ format: $(VENV)/dev.stamp  ## let ruff format and fix
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 
+docs: $(VENV)/dev.stamp  ## build the site into docs/_build/html; a warning is an error
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 wheel: $(VENV)/dev.stamp  ## build the wheel into dist/
 	$(BIN)/python -m build --wheel --outdir dist .
 
 tables: $(VENV)/dev.stamp  ## make the tables of README.md, benchmarks/ and docs/ anew
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python docs/diagnostics.py
+	$(BIN)/python docs/figures/connection.py
 
 pictures: $(VENV)/dev.stamp  ## draw the pictures in docs/ anew
 	$(BIN)/python models/demo.py --gallery docs/models.png
 
 clean:  ## remove what was built, .venv included
-	rm -rf $(VENV) build dist demo .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist demo docs/_build .pytest_cache .ruff_cache .hypothesis
 
 # A stamp is written last, so that an interrupted installation is taken up again.
 $(VENV)/view.stamp: pyproject.toml

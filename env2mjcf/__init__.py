@@ -20,6 +20,14 @@ from .options import Limits as Limits
 from .options import Options as Options
 
 if TYPE_CHECKING:
+    from .companions import PathRecord as PathRecord
+    from .companions import Roadmap as Roadmap
+    from .companions import read_path as read_path
+    from .companions import read_query as read_query
+    from .companions import read_roadmap as read_roadmap
+    from .companions import write_path as write_path
+    from .companions import write_query as write_query
+    from .companions import write_roadmap as write_roadmap
     from .contact.types import Contact as Contact
     from .contact.types import PackedContacts as PackedContacts
     from .contact.types import PathReport as PathReport
@@ -33,6 +41,14 @@ if TYPE_CHECKING:
 
 # These need MuJoCo, which reading does not: they are imported when they are first used.
 _LAZY = {
+    "PathRecord": ".companions",
+    "Roadmap": ".companions",
+    "read_path": ".companions",
+    "read_query": ".companions",
+    "read_roadmap": ".companions",
+    "write_path": ".companions",
+    "write_query": ".companions",
+    "write_roadmap": ".companions",
     "Contact": ".contact.types",
     "PackedContacts": ".contact.types",
     "PathReport": ".contact.types",

@@ -18,6 +18,7 @@ from .report import Report
 from .simulation.loading import load_file
 from .simulation.preparing import prepare
 from .simulation.scene import Scene
+from .writing import replaced
 
 _ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
 
@@ -95,7 +96,8 @@ def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[P
             path = folder / relative
             # The name holds the hash of the content: what is there and whole is right.
             if not path.exists() or path.stat().st_size != len(data):
-                _write_beside(path, data)
+                with replaced(path) as beside:
+                    beside.write_bytes(data)
                 made.append(path)
         staged.write_bytes(document.xml.encode("utf-8"))
         load_file(staged, document, scene.compiled.assembly, log)
@@ -115,17 +117,6 @@ def _remove(folder: Path, names: set[str]) -> None:
         names = names - _named_assets(scene)
     for name in names:
         (folder / "assets" / name).unlink(missing_ok=True)
-
-
-def _write_beside(path: Path, data: bytes) -> None:
-    """Write a file beside its place, then rename it there."""
-    beside = path.with_name(f".{path.name}-{secrets.token_hex(8)}")
-    try:
-        beside.write_bytes(data)
-        os.replace(beside, path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
 
 
 def _named_assets(xml: Path) -> set[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import tempfile
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -16,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from .simulation.scene import Scene
 from .simulation.verdicts import Judge, touch
 from .transforms import Array
-from .view.offscreen import RenderError, render
+from .view.offscreen import RenderError
+from .view.picture import picture as draw
 
 __all__ = ["assert_free", "assert_valid", "assert_valid_path"]
 
@@ -162,12 +162,7 @@ def _draw(scene: Scene, rows: Array, picture: str | PathLike[str] | None) -> str
         return ""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="env2mjcf-") as folder:
-            xml = Path(folder) / "scene.xml"
-            for name, data in {xml.name: scene.xml.encode("utf-8"), **scene.assets}.items():
-                (Path(folder) / name).parent.mkdir(exist_ok=True)
-                (Path(folder) / name).write_bytes(data)
-            render(xml, target, scene.space.qpos(rows))
+        draw(scene, rows[-1], file=target, ghosts=rows[:-1], contacts=True)
     except (RenderError, OSError) as error:
         return f"no picture: {error}"
     return f"picture: {target}"

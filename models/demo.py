@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 import env2mjcf
+from env2mjcf import view
 from env2mjcf.view import offscreen
 
 HERE = Path(__file__).resolve().parent
@@ -24,17 +24,17 @@ SECONDS = 2.0
 # A third of a second after release the robot is still in the air.
 GHOSTS = (0.0, 0.33)
 
-# What the gallery shows: scene, files of its robot and query, keyframe, and how much nearer the camera looks.
-GALLERY: tuple[tuple[str, dict[str, str], str, float], ...] = (
-    ("seed/seed.env", {}, "home", 1.15),
-    ("gantry/gantry.env", {}, "home", 1.1),
-    ("bug-trap/bug-trap.env", {"query": "bug-trap/bug-trap.query"}, "goal", 0.72),
-    ("spherical-arm/spherical-arm.env", {"query": "spherical-arm/spherical-arm.query"}, "start", 1.25),
-    ("closed-chain/closed-chain.env", {}, "home", 1.3),
-    ("alpha/alpha.env", {"query": "alpha/alpha.query"}, "start", 1.05),
-    ("two-robots/two-robots.env", {}, "home", 1.25),
-    ("maze/maze.xml", {}, "start", 1.3),
-    ("xml-arm/xml-arm.xml", {}, "start", 1.25),
+# What the gallery shows: scenes, and their queries where the robots are to stand at the start.
+GALLERY: tuple[tuple[str, dict[str, str]], ...] = (
+    ("seed/seed.env", {}),
+    ("gantry/gantry.env", {}),
+    ("bug-trap/bug-trap.env", {"query": "bug-trap/bug-trap.query"}),
+    ("spherical-arm/spherical-arm.env", {"query": "spherical-arm/spherical-arm.query"}),
+    ("closed-chain/closed-chain.env", {}),
+    ("alpha/alpha.env", {"query": "alpha/alpha.query"}),
+    ("two-robots/two-robots.env", {}),
+    ("maze/maze.xml", {}),
+    ("xml-arm/xml-arm.xml", {}),
 )
 # In pixels, but for the first.
 COLUMNS, TILE, CAPTION, MARGIN = 3, (400, 300), 26, 4
@@ -88,8 +88,9 @@ def demo(out: Path, picture: Path | None, console: Console) -> None:
     console.print(f"on the ground: {', '.join(resting(model, data)) or 'nothing'}\n", markup=False)
 
     picture = picture or out / "seed.png"
+    *ghosts, last = scene.space.from_qpos(poses)
     try:
-        offscreen.render(result.xml, picture, poses)
+        view.picture(scene, last, ghosts=ghosts, size=(1280, 960), camera="overview", file=picture)
     except offscreen.RenderError as error:
         console.print(f"picture   none: {error}", markup=False)
     else:
@@ -138,17 +139,14 @@ def gallery(picture: Path) -> None:
     (width, height), rows = TILE, -(-len(GALLERY) // COLUMNS)
     sheet = Image.new("RGB", (COLUMNS * width, rows * (height + CAPTION)), "white")
     pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(15)
-    with tempfile.TemporaryDirectory() as folder:
-        for i, (scene, files, pose, zoom) in enumerate(GALLERY):
-            options = {name: HERE / file for name, file in files.items()}
-            result = env2mjcf.convert(HERE / scene, Path(folder) / str(i), ground=True, **options)
-            size = (width - 2 * MARGIN, height - 2 * MARGIN)
-            tile = offscreen.render(result.xml, Path(folder) / f"{i}.png", pose, size=size, zoom=zoom)
-            left, top = i % COLUMNS * width + MARGIN, i // COLUMNS * (height + CAPTION) + MARGIN
-            with Image.open(tile) as image:
-                sheet.paste(image.convert("RGB"), (left, top))
-            caption = f"{Path(scene).parent.name}, dialect {result.report.dialect}"
-            pen.text((left + width / 2, top + height), caption, fill=(70, 75, 80), font=font, anchor="mt")
+    for i, (path, files) in enumerate(GALLERY):
+        scene = env2mjcf.load(HERE / path, **{name: HERE / file for name, file in files.items()})
+        start = scene.queries[0].q[0] if scene.queries else None
+        tile = view.picture(scene, start, size=(width - 2 * MARGIN, height - 2 * MARGIN))
+        left, top = i % COLUMNS * width + MARGIN, i // COLUMNS * (height + CAPTION) + MARGIN
+        sheet.paste(Image.fromarray(tile), (left, top))
+        caption = f"{Path(path).parent.name}, dialect {scene.report.dialect}"
+        pen.text((left + width / 2, top + height), caption, fill=(70, 75, 80), font=font, anchor="mt")
     picture.parent.mkdir(parents=True, exist_ok=True)
     sheet.quantize(256, kmeans=2, dither=Image.Dither.NONE).save(picture, format="PNG", optimize=True)
 

@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import numpy as np
 import tyro
 from rich.text import Text
-from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .judgements import (
+    Listed,
+    as_json,
+    edge_lines,
+    edge_summary,
+    first_invalid,
+    node_summary,
+    pose_summary,
+    verdict_lines,
+)
+from .printing import print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
+    from ..simulation.edge_verdicts import EdgeJudge
     from ..simulation.scene import Scene
-    from ..simulation.verdicts import Judge, Verdict
-    from .rows import Configurations
+    from ..simulation.verdicts import Judge
+    from .rows import Configurations, Graph
+
+V = TypeVar("V")
 
 # More configurations than this are not listed one by one unless asked for.
 _LISTED = 20
@@ -34,11 +45,14 @@ class Check:
 
     A configuration is numbers in the file's own units (turns in dialect A, fractions of pi in B to E; lengths as in
     the file), as many as there are degrees of freedom of all robots, or of one robot behind its index. A .query file,
-    or a .csv or .npy file with such rows, holds many. Without any: the scene's own tasks, else home.
+    or a .csv or .npy file with such rows, holds many; a .path or .map file of any version holds the ways between them,
+    too, which are checked at even steps. Without any: the scene's own tasks, else home.
 
     Examples:
       env2mjcf check serial.env -0.5 0 0 0.125 0.25 0
       env2mjcf check serial.env --query serial.query
+      env2mjcf check serial.env serial.path --resolution 0.01
+      env2mjcf check serial.env serial.map --certified --picture serial.png
       env2mjcf check box.env samples.npy --robots box.robot --radians
       env2mjcf check problem.xml --json
 
@@ -46,7 +60,10 @@ class Check:
         scene: An env file, an XML environment or a problem XML.
         configurations: Numbers of one configuration, or a file of many.
         radians: Numbers are radians and metres.
-        all: List every configuration, also when there are many.
+        all: List every configuration and edge, also when there are many.
+        resolution: Greatest distance in metres that any point of a robot moves between two checks of an edge; the
+            file's PositionRes by default, else 0.01 of the scene's extent.
+        certified: Prove, too, that nothing touches between the checks of an edge.
         output: How to report.
         options: What may be chosen.
     """
@@ -55,6 +72,8 @@ class Check:
     configurations: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[NUMBERS | FILE]"), Positional] = ()
     radians: bool = False
     all: bool = False
+    resolution: float | None = None
+    certified: bool = False
     output: OutputFlags = field(default_factory=Output)
     options: OptionFlags = field(default_factory=Options)
 
@@ -72,14 +91,29 @@ class Check:
         log.extend(scene.diagnostics)
         rows = self._rows(scene, log)
         print_diagnostics(log, self.output.verbose)
-        judge = Judge(scene, scene.space.check(rows.q), rows.labels)
+        poses = rows.graph.poses if rows.graph else None
+        judge = Judge(
+            scene, scene.space.check(rows.q), rows.labels, poses.links if poses else None, poses.fits if poses else None
+        )
+        edges = self._edges(scene, rows.graph)
+        valid = bool(judge.valid.all()) and (edges is None or bool(edges.valid.all()))
         if self.output.json:
-            rows_bar = tqdm(range(len(rows.q)), unit="q", delay=1, leave=False, disable=not sys.stderr.isatty())
-            verdicts = [judge.verdict(i) for i in rows_bar]
-            print_json({"valid": bool(judge.valid.all()), "dofs": scene.space.names, "configurations": verdicts})
+            print_json({"valid": valid, "dofs": scene.space.names, **as_json(judge, rows.graph, edges)})
         else:
-            print_parts(self._lines(judge))
-        return 0 if judge.valid.all() else 1
+            print_parts(self._lines(judge, rows.graph, edges))
+        return 0 if valid else 1
+
+    def _edges(self, scene: Scene, graph: Graph | None) -> EdgeJudge | None:
+        from ..simulation.edge_verdicts import EdgeJudge
+
+        if graph is None:
+            if self.certified or self.resolution is not None:
+                raise ValueError("--resolution and --certified are for the edges of a path or roadmap; there is none")
+            return None
+        checked = None
+        if graph.poses is not None:
+            checked = graph.poses.fits[graph.edges.ends[:, 0]] & graph.poses.fits[graph.edges.ends[:, 1]]
+        return EdgeJudge(scene, graph.edges, self.resolution, self.certified, checked)
 
     def _rows(self, scene: Scene, log: DiagnosticLog) -> Configurations:
         from .configurations import of_file, of_numbers, of_scene
@@ -91,50 +125,32 @@ class Check:
             return of_file(scene, words[0], self.radians, self.options.limits, log)
         return of_numbers(scene, words, self.radians)
 
-    def _lines(self, judge: Judge) -> Iterator[Text]:
-        rough = False
+    def _lines(self, judge: Judge, graph: Graph | None, edges: EdgeJudge | None) -> Iterator[Text]:
+        rough: list[bool] = []
+        yield from self._listed("configuration", judge, verdict_lines, rough)
+        if edges is not None:
+            yield from self._listed("edge", edges, edge_lines, rough)
+        if any(rough):
+            yield Text("depths at bodies that are not convex are rough: such meshes collide as thin plates", "dim")
+        if graph is not None and graph.poses is not None:
+            yield pose_summary(graph.poses)
+        yield node_summary(judge, "node" if graph and graph.kind == "roadmap" else "configuration")
+        if edges is not None:
+            yield edge_summary(edges)
+        yield from first_invalid(judge, edges)
+
+    def _listed(
+        self, what: str, judge: Listed[V], lines: Callable[[V], Iterator[Text]], rough: list[bool]
+    ) -> Iterator[Text]:
         every = self.all or len(judge.valid) <= _LISTED
         chosen = range(len(judge.valid)) if every else np.flatnonzero(~judge.valid).tolist()
         for i in chosen if self.all else chosen[:_LISTED]:
             verdict = judge.verdict(i)
-            rough |= judge.rough(verdict)
-            yield from _verdict_lines(verdict)
+            rough.append(judge.rough(verdict))
+            yield from lines(verdict)
         left = len(chosen) - _LISTED
         if left > 0 and not self.all:
-            yield Text(f"... and {left} more that are invalid (--all lists every configuration)", "dim")
-        if rough:
-            yield Text("depths at bodies that are not convex are rough: such meshes collide as thin plates", "dim")
-        yield _summary(judge)
-
-
-def _verdict_lines(verdict: Verdict) -> Iterator[Text]:
-    wrong = [
-        what
-        for what, so in (
-            ("in collision", verdict.in_collision),
-            ("out of limits", verdict.limits),
-            ("outside the boundary", verdict.outside),
-        )
-        if so
-    ]
-    yield Text.assemble(
-        f"{one_line(verdict.label)}: ", (", ".join(wrong), "bold red") if wrong else ("valid", "bold green")
-    )
-    for reason in verdict.reasons():
-        yield Text(f"    {one_line(reason)}")
-
-
-def _summary(judge: Judge) -> Text:
-    total, valid = len(judge.valid), int(judge.valid.sum())
-    counts = [f"{valid} valid"]
-    for what, so in (
-        ("in collision", judge.in_collision),
-        ("out of limits", ~judge.in_limits),
-        ("outside the boundary", ~judge.inside),
-    ):
-        if so.any():
-            counts.append(f"{int(so.sum())} {what}")
-    return Text(f"{total} configuration{'' if total == 1 else 's'}: {', '.join(counts)}", "bold")
+            yield Text(f"... and {left} more that are invalid (--all lists every {what})", "dim")
 
 
 def _is_number(word: str) -> bool:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from ..errors import DiagnosticLog
+from ..formats.path import is_path
 from ..formats.query import read_query
-from ..formats.source import read_source
+from ..formats.roadmap import is_roadmap
+from ..formats.source import Source, read_source
 from ..model import Task
 from ..options import Limits
 from ..simulation.scene import Query, Scene
 from ..transforms import Array
 from .rows import Configurations, expected, joined, of_array, of_text, row_of
+from .rows_of_files import of_path, of_roadmap
 
 
 def of_scene(scene: Scene) -> Configurations:
@@ -41,10 +44,13 @@ def of_numbers(scene: Scene, words: Sequence[str], radians: bool) -> Configurati
 
 
 def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: DiagnosticLog) -> Configurations:
-    """Read a NumPy file (.npy), a text file of rows (.csv, .txt), or else a query file.
+    """Read a NumPy file (.npy), a text file of rows (.csv, .txt), a path, a roadmap, or else a query.
+
+    Paths (.path) and roadmaps (.map) are known by their text, too, whatever their names are.
 
     Raises:
         FormatError: The file cannot be read, or a row fits no robot.
+        ValueError: A path or roadmap is to be in radians.
     """
     extension = Path(path).suffix.lower()
     if extension == ".npy":
@@ -52,9 +58,23 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
     source = read_source(path, log, limits)
     if extension in (".csv", ".txt"):
         return of_text(scene, source, radians, log)
+    reader = _graph_reader(source, extension)
+    if reader is not None:
+        if radians:
+            raise ValueError("--radians is for plain numbers; paths and roadmaps are in units of their own")
+        return reader(scene, source, log)
     tasks = read_query(source, [s.stop - s.start for s in scene.space.robot_slices], log)
     rows = [Query(t.robot, _task_q(scene, t, radians), t.label) for t in tasks]
     return joined(scene, list(_task_rows(scene, rows)))
+
+
+def _graph_reader(source: Source, extension: str) -> Callable[[Scene, Source, DiagnosticLog], Configurations] | None:
+    # What a file says counts for more than its name.
+    if is_path(source):
+        return of_path
+    if is_roadmap(source):
+        return of_roadmap
+    return {".path": of_path, ".map": of_roadmap}.get(extension)
 
 
 def _task_q(scene: Scene, task: Task, radians: bool) -> Array:

@@ -11,6 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 
 from ..errors import Env2MjcfError, did_you_mean
+from ..view.offscreen import RenderError
 from .arguments import Verb, parse
 from .printing import one_line, print_diagnostics, print_json
 
@@ -25,6 +26,9 @@ VERBS = {
     "check": ("check", "Check", "tell whether configurations are valid, and who touches whom"),
     "lint": ("lint", "Lint", "list everything doubtful in scenes, robots and meshes"),
     "batch": ("batch", "Batch", "write verdicts on files of configurations, larger than memory if need be"),
+    "render": ("render", "Render", "draw a scene into a PNG file, without a screen"),
+    "play": ("play", "Play", "film robots that follow a path"),
+    "view": ("view", "View", "show a scene on a web page: sliders, live contacts, paths that play"),
     "plan": ("plan", "Plan", "find a way from start to goal, prove it, and write it as a path"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
@@ -41,6 +45,7 @@ examples:
   env2mjcf convert scene.env out/                 out/scene.xml, for MuJoCo
   env2mjcf check scene.env --query scene.query    are start and goal free
   env2mjcf batch scene.env q.npy -o hits.npy      millions of verdicts
+  env2mjcf view scene.env                         a page with sliders
   env2mjcf plan scene.env --query scene.query     a way from start to goal
   env2mjcf lint scenes/                           what is doubtful in a folder
   env2mjcf convert --help                         all options of a verb
@@ -118,7 +123,7 @@ def _run(name: str, verb: Verb) -> int:
         raise
     except Exception as error:
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
-        if type(error) not in (ValueError, NotImplementedError):
+        if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
         _show_traceback(verb.output.debug)
         _complain(f"{name}: {error}")

@@ -126,7 +126,7 @@ class Plan:
         return task
 
     def _write(self, scene: Scene, robot: int, result: Result) -> Path | None:
-        from ..planning.writing import write_path
+        from ..companions import write_path
 
         if self.out is None:
             return None
@@ -134,13 +134,7 @@ class Plan:
         if not result.solved:
             out = out.with_name(f"{out.stem}.approach.path")
         q = result.path if self.corners else dense(scene, result)
-        try:
-            return write_path(scene, q, out, robot)
-        except OSError as error:
-            DiagnosticLog().fail(
-                ConversionError, "CFG542", str(out), f"{out} cannot be written: {error.strerror or error}",
-                hint="choose another output, or make room",
-            )  # fmt: skip
+        return write_path(scene, q, out, robot)
 
     def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]]) -> None:
         if self.output.json:

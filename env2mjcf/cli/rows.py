@@ -9,13 +9,51 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
-from ..formats.query import split_row
+from ..formats.rows import split_row
 from ..formats.source import Source, read_source
 from ..options import Limits
+from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
 from ..transforms import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Where a file puts the links of each row.
+
+    Attributes:
+        links: (n, nlinks, 4, 4) world poses.
+        fits: (n,) whether the row's configuration puts them there.
+        error: How far off the links are with the worst configuration, in metres.
+    """
+
+    links: Array
+    fits: NDArray[np.bool_]
+    error: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Graph:
+    """What a path or a roadmap says about its rows.
+
+    Attributes:
+        kind: "path" or "roadmap".
+        version: Of the format; empty where the file has none.
+        lines: (n,) line that each row stands on.
+        edges: The ways between rows.
+        poses: Where the file puts the links, if it does not hold configurations.
+        ids: (n,) what a roadmap calls its nodes.
+    """
+
+    kind: str
+    version: str
+    lines: NDArray[np.int64]
+    edges: Edges
+    poses: Poses | None = None
+    ids: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,10 +63,12 @@ class Configurations:
     Attributes:
         q: (n, dim) radians and metres.
         labels: What each row is called in reports.
+        graph: The rest of a path or roadmap.
     """
 
     q: Array
     labels: tuple[str, ...]
+    graph: Graph | None = None
 
 
 def joined(scene: Scene, rows: Sequence[tuple[str, Array]]) -> Configurations:

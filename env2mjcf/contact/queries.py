@@ -231,6 +231,15 @@ class ContactQueries:
             others = self._triangles.clearance.nearest_pairs(poses)
         return self._triangles.manifolds.contacts(found, others, poses)
 
+    def contacts_of_poses(self, poses: Array) -> list[Contact]:
+        """Return the contacts of links that stand anywhere, (nlinks, 4, 4), found on triangles."""
+        by_name = self._named(poses[None])
+        if self._triangles.clearance.signed(by_name, 1)[0] > 0:
+            return []
+        inside = self._containment.pairs_inside(by_name) if self._containment.needed else []
+        pairs = {*self._triangles.clearance.nearest_pairs(by_name), *(index for index, _ in inside)}
+        return [c for c in self._triangles.manifolds.contacts({}, pairs, by_name) if c.distance <= 0]
+
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)
         if data is None:
@@ -238,10 +247,13 @@ class ContactQueries:
         return data
 
     def _poses_by_name(self, rows: Array) -> dict[str, Array]:
-        poses = self.link_poses(rows)
+        return self._named(self.link_poses(rows))
+
+    def _named(self, poses: Array) -> dict[str, Array]:
+        """Return the poses of links, (n, nlinks, 4, 4), and of obstacles by name, (n, 4, 4) each."""
         by_name = {p.name: poses[:, i] for i, p in enumerate(self.links)}
         for part in self._assembly.obstacles:
-            by_name[part.name] = np.broadcast_to(part.pose, (len(rows), 4, 4))
+            by_name[part.name] = np.broadcast_to(part.pose, (len(poses), 4, 4))
         return by_name
 
     @cached_property

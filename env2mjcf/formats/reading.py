@@ -16,8 +16,9 @@ from .detect import detect, is_xml
 from .env import read_env
 from .lexer import Scanner
 from .problem import Problem, ProblemRobot, ProblemTask, read_problem
-from .query import read_query, split_row
+from .query import read_query
 from .robot import read_robot
+from .rows import split_row
 from .source import Source, read_source
 from .xml import Node, parse_xml
 

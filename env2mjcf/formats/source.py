@@ -15,7 +15,7 @@ from ..options import Limits, PathArgument
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
-_SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query")
+_SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query", ".path", ".map")
 
 
 @dataclass(frozen=True, slots=True)

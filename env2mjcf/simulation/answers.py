@@ -155,6 +155,20 @@ class Answers(EdgeAnswers):
         """
         return self._queries.contacts(self._row(q), engine)
 
+    def contacts_of_poses(self, poses: ArrayLike) -> list[Contact]:
+        """Return the contacts of links placed by hand, whether or not any configuration puts them there.
+
+        Args:
+            poses: World poses of all links in the order of `link_names`, (nlinks, 4, 4).
+
+        Raises:
+            ValueError: The shape is another.
+        """
+        placed = np.asarray(poses, dtype=np.float64)
+        if placed.shape != (len(self._queries.links), 4, 4):
+            raise ValueError(f"poses of shape {placed.shape}; expected ({len(self._queries.links)}, 4, 4)")
+        return self._queries.contacts_of_poses(placed)
+
     def packed_contacts(
         self,
         q: ArrayLike,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..contact.boundary import BoundaryTest
 from ..contact.types import Contact
@@ -68,10 +69,20 @@ class Judge:
         scene: The scene.
         q: (n, dim) configurations.
         labels: What each is called.
+        poses: (n, nlinks, 4, 4) where links stand instead, in rows that are not `fits`.
+        fits: (n,) whether q puts the links where they stand; None for all.
     """
 
-    def __init__(self, scene: Scene, q: Array, labels: Sequence[str]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        q: Array,
+        labels: Sequence[str],
+        poses: Array | None = None,
+        fits: NDArray[np.bool_] | None = None,
+    ) -> None:
         self._scene, self._q, self._labels = scene, q, labels
+        self._placed = np.zeros(len(q), dtype=bool) if fits is None or poses is None else ~fits
         assembly = scene.compiled.assembly
         links = [p for r in assembly.robots for p in r.links]
         self._boundaries = [(p.name, BoundaryTest(assembly.environment.boundary, [p])) for p in links]
@@ -79,12 +90,17 @@ class Judge:
         self._plates = {p.name for p in assembly.parts() if not hulls and not p.analysis.convex}
         self.in_limits = scene.space.within_limits(q)
         self.in_collision = scene.in_collision(q, progress=True)
-        self.inside = BoundaryTest(assembly.environment.boundary, links).inside(scene.link_poses(q))
+        self._poses = scene.link_poses(q)
+        if poses is not None and self._placed.any():
+            self._poses[self._placed] = poses[self._placed]
+            self.in_limits[self._placed] = True
+            self.in_collision[self._placed] = [bool(scene.contacts_of_poses(p)) for p in poses[self._placed]]
+        self.inside = BoundaryTest(assembly.environment.boundary, links).inside(self._poses)
         self.valid = self.in_limits & self.inside & ~self.in_collision
 
     def verdict(self, index: int) -> Verdict:
         """Return all that is wrong with one configuration."""
-        scene, q = self._scene, self._q[index]
+        q = self._q[index]
         collides = bool(self.in_collision[index])
         return Verdict(
             self._labels[index],
@@ -92,8 +108,8 @@ class Judge:
             bool(self.valid[index]),
             collides,
             () if self.in_limits[index] else self._broken_limits(q),
-            () if self.inside[index] else self._outside(q),
-            _deepest(scene.contacts(q)) if collides else (),
+            () if self.inside[index] else self._outside(self._poses[index]),
+            _deepest(self._contacts(index)) if collides else (),
         )
 
     def rough(self, verdict: Verdict) -> bool:
@@ -108,9 +124,15 @@ class Judge:
             for i in np.flatnonzero(beyond)
         )
 
-    def _outside(self, q: Array) -> tuple[str, ...]:
-        poses = self._scene.link_poses(q[None])
-        return tuple(name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0])
+    def _contacts(self, index: int) -> list[Contact]:
+        if self._placed[index]:
+            return self._scene.contacts_of_poses(self._poses[index])
+        return self._scene.contacts(self._q[index])
+
+    def _outside(self, poses: Array) -> tuple[str, ...]:
+        return tuple(
+            name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[None, i : i + 1])[0]
+        )
 
 
 def _deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:

@@ -1,22 +1,22 @@
-"""Pictures without a screen, drawn in a child process: GL never enters the process that asks."""
+"""Drawing without a screen, in a child process: GL never enters the process that asks."""
 
 from __future__ import annotations
 
 import functools
-import importlib.util
 import json
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import ArrayLike
+from typing import IO, Any
 
 _WORKER = Path(__file__).with_name("worker.py")
-_SECONDS = 300
+_SECONDS_TO_TRY = 60
 # What MuJoCo itself reads from MUJOCO_GL as "no pictures".
 _OFF = ("disable", "disabled", "off", "false", "0")
 # A GPU first, where there is one; OSMesa needs none.
@@ -24,7 +24,7 @@ _CANDIDATES = {"Linux": ("egl", "osmesa"), "Darwin": ("cgl",), "Windows": ("wgl"
 
 
 class RenderError(RuntimeError):
-    """A picture that cannot be drawn: a library is missing, or the model has no such camera or keyframe."""
+    """A picture that cannot be drawn: a library is missing, or the child process failed."""
 
 
 def backend() -> str | None:
@@ -33,50 +33,6 @@ def backend() -> str | None:
     A backend that MUJOCO_GL names is tried first; MUJOCO_GL=disable switches pictures off.
     """
     return _backend(os.environ.get("MUJOCO_GL", "").strip().lower())
-
-
-def render(
-    xml: str | os.PathLike[str],
-    picture: str | os.PathLike[str],
-    pose: str | ArrayLike = "home",
-    *,
-    camera: str = "overview",
-    size: tuple[int, int] = (1280, 960),
-    zoom: float = 1.0,
-) -> Path:
-    """Draw a model into a PNG file.
-
-    Args:
-        xml: An MJCF file.
-        picture: The file to write; its folder must exist.
-        pose: Name of a keyframe; or qpos, (nq,); or (k, nq), where all rows but the last are drawn as ghosts.
-        camera: Name of a camera of the model.
-        size: Width and height in pixels.
-        zoom: How much nearer the camera sees the scene.
-
-    Returns:
-        The picture's path.
-
-    Raises:
-        RenderError: No GL library or no pillow, or the model cannot be drawn so.
-    """
-    if importlib.util.find_spec("PIL") is None:
-        raise RenderError("pictures need pillow: pip install 'env2mjcf[view]'")
-    name = backend()
-    if name is None:
-        raise RenderError(missing())
-    request = {
-        "xml": os.path.abspath(xml),
-        "picture": os.path.abspath(picture),
-        "pose": pose if isinstance(pose, str) else np.atleast_2d(np.asarray(pose, dtype=np.float64)).tolist(),
-        "camera": camera,
-        "size": list(size),
-        "zoom": zoom,
-    }
-    finished = _run(name, json.dumps(request))
-    if finished.returncode != 0:
-        raise RenderError(f"cannot draw {os.fspath(xml)} with {name}: {_last_line(finished.stderr)}")
-    return Path(picture)
 
 
 def missing() -> str:
@@ -88,6 +44,43 @@ def missing() -> str:
     return "pictures need a working OpenGL driver: none was found"
 
 
+@contextmanager
+def drawn(request: Mapping[str, Any]) -> Generator[tuple[dict[str, Any], IO[bytes]]]:
+    """Let a child process draw a request; see `worker` for both sides' words.
+
+    Yields:
+        What the child says of its pictures, and the stream that they come out of.
+
+    Raises:
+        RenderError: There is no GL library, or the child failed.
+    """
+    name = backend()
+    if name is None:
+        raise RenderError(missing())
+    with tempfile.TemporaryFile() as errors, _child(name, errors) as child:
+        assert child.stdin is not None
+        assert child.stdout is not None
+        # A request may be longer than a pipe holds, and so may be what comes back.
+        feeder = threading.Thread(target=_feed, args=(child.stdin, json.dumps(request).encode()), daemon=True)
+        feeder.start()
+        head = child.stdout.readline()
+        if not head:
+            raise RenderError(f"cannot draw with {name}: {_last_line(child, errors)}")
+        yield json.loads(head), child.stdout
+
+
+def read_exactly(stream: IO[bytes], count: int) -> bytes:
+    """Read one picture.
+
+    Raises:
+        RenderError: The child ended before it was whole.
+    """
+    data = stream.read(count)
+    if len(data) != count:
+        raise RenderError("the process that draws ended too early")
+    return data
+
+
 @functools.cache
 def _backend(wish: str) -> str | None:
     if wish in _OFF:
@@ -95,23 +88,54 @@ def _backend(wish: str) -> str | None:
     candidates = _CANDIDATES.get(platform.system(), ("glfw",))
     if wish in candidates:
         candidates = (wish, *(c for c in candidates if c != wish))
-    return next((c for c in candidates if _run(c, "null").returncode == 0), None)
+    return next((c for c in candidates if _works(c)), None)
 
 
-def _run(name: str, request: str) -> subprocess.CompletedProcess[str]:
-    """Hand a request to a child with a GL backend of its own."""
-    environment: Mapping[str, str] = {**os.environ, "MUJOCO_GL": name, "PYOPENGL_PLATFORM": name}
-    if name not in _CANDIDATES["Linux"]:
-        environment = {k: v for k, v in environment.items() if k != "PYOPENGL_PLATFORM"}
-    command = [sys.executable, "-P", str(_WORKER)]
+def _works(name: str) -> bool:
     try:
-        return subprocess.run(
-            command, input=request, env=environment, capture_output=True, text=True, timeout=_SECONDS, check=False
+        finished = subprocess.run(
+            _COMMAND, input=b"null", env=_environment(name), capture_output=True, timeout=_SECONDS_TO_TRY, check=False
         )
     except subprocess.TimeoutExpired:
-        return subprocess.CompletedProcess(command, 1, "", f"no answer within {_SECONDS} seconds")
+        return False
+    return finished.returncode == 0
 
 
-def _last_line(text: str) -> str:
-    lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1] if lines else "the child process ended without a message"
+_COMMAND = (sys.executable, "-P", str(_WORKER))
+
+
+@contextmanager
+def _child(name: str, errors: IO[bytes]) -> Generator[subprocess.Popen[bytes]]:
+    """Start a child with a GL backend of its own, which does not outlive its use."""
+    child = subprocess.Popen(
+        _COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, env=_environment(name)
+    )
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+        assert child.stdout is not None
+        child.stdout.close()
+
+
+def _environment(name: str) -> dict[str, str]:
+    environment = {**os.environ, "MUJOCO_GL": name, "PYOPENGL_PLATFORM": name}
+    if name not in _CANDIDATES["Linux"]:
+        del environment["PYOPENGL_PLATFORM"]
+    return environment
+
+
+def _feed(stdin: IO[bytes], data: bytes) -> None:
+    try:
+        with stdin:
+            stdin.write(data)
+    except OSError:
+        pass  # the child has ended, and its own words say why
+
+
+def _last_line(child: subprocess.Popen[bytes], errors: IO[bytes]) -> str:
+    child.wait()
+    errors.seek(0)
+    lines = [line for line in errors.read().decode("utf-8", "replace").splitlines() if line.strip()]
+    return lines[-1] if lines else f"the child process ended with status {child.returncode}"

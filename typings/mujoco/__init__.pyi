@@ -9,6 +9,8 @@ class _Opaque:
 class MjModel(_Opaque):
     @staticmethod
     def from_xml_path(filename: str, assets: Any = ..., vfs: Any = ...) -> MjModel: ...
+    @staticmethod
+    def from_binary_path(filename: str) -> MjModel: ...
 
 class MjSpec(_Opaque):
     @staticmethod

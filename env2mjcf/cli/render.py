@@ -1,0 +1,102 @@
+"""`env2mjcf render`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import tyro
+from rich.text import Text
+from tyro.conf import Positional
+
+from ..errors import DiagnosticLog
+from ..options import Options
+from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .cameras import camera_of, size_of
+from .printing import one_line, print_diagnostics, print_json, print_parts, working
+
+if TYPE_CHECKING:
+    from ..simulation.scene import Scene
+    from ..transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Render:
+    """Draw a scene into a PNG file, without a screen.
+
+    The robots stand at --config (numbers in the file's own units), else at the start of the query, its other
+    configurations drawn nearly transparent, else at home. The camera has everything in view; unless told, it looks from
+    where the robots can be seen, and makes obstacles transparent where they cannot.
+
+    Examples:
+      env2mjcf render scene.env -o scene.png
+      env2mjcf render serial.env -o hit.png --config -0.5 0 0 0.125 0.25 0 --contacts
+      env2mjcf render scene.env -o query.png --query scene.query --camera top
+      env2mjcf render scene.env -o way.png --trail scene.path --camera 120,-35
+
+    Attributes:
+        scene: An env file, an XML environment or a problem XML.
+        out: The PNG file to write.
+        config: Numbers of one configuration, of all robots, or of one behind its index.
+        radians: They are radians and metres.
+        camera: overview, front, back, left, right, top, or azimuth,elevation of the line of sight in degrees.
+        contacts: Tint what touches, and show where with arrows along the normals.
+        trail: A path file: a line, and robots nearly transparent along it.
+        size: Width and height in pixels.
+        see_through: Draw obstacles transparent, or --no-see-through: never.
+        output: How to report.
+        options: What may be chosen.
+    """
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
+    out: Annotated[str, tyro.conf.arg(aliases=("-o",), metavar="PICTURE.png")]
+    config: Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBERS")] = ()
+    radians: bool = False
+    camera: Annotated[str | None, tyro.conf.arg(metavar="NAME|AZIMUTH,ELEVATION")] = None
+    contacts: bool = False
+    trail: Annotated[str | None, tyro.conf.arg(metavar="PATH")] = None
+    size: Annotated[str, tyro.conf.arg(metavar="WIDTHxHEIGHT")] = "1280x960"
+    see_through: bool | None = None
+    output: OutputFlags = field(default_factory=Output)
+    options: OptionFlags = field(default_factory=Options)
+
+    def run(self) -> int:
+        """Draw, and say where the picture is."""
+        from ..simulation.preparing import load
+        from ..view.picture import picture
+
+        if not self.out.lower().endswith(".png"):
+            raise ValueError(f"--out is {self.out}; expected a file that ends in .png")
+        camera, size = camera_of(self.camera), size_of(self.size)
+        with working(f"loading {self.scene}"):
+            scene = load(self.scene, **keywords(self.options))
+        log = DiagnosticLog(self.options.strict)
+        log.extend(scene.diagnostics)
+        trail = None if self.trail is None else self._trail(scene, log)
+        print_diagnostics(log, self.output.verbose)
+        rows = self._rows(scene)
+        with working("drawing"):
+            picture(
+                scene, rows[0], file=self.out, size=size, camera=camera, contacts=self.contacts, ghosts=rows[1:],
+                trail=trail, see_through=self.see_through,
+            )  # fmt: skip
+        touching = sorted({(c.link, c.other) for c in scene.contacts(rows[0])}) if self.contacts else []
+        if self.output.json:
+            print_json({"picture": self.out, "size": size, "touching": touching, "diagnostics": tuple(log)})
+        else:
+            print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold")])
+            print_parts(Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching)
+        return 0
+
+    def _rows(self, scene: Scene) -> Array:
+        from .configurations import of_numbers
+
+        if self.config:
+            return of_numbers(scene, [str(x) for x in self.config], self.radians).q
+        return scene.queries[0].q if scene.queries else scene.space.home[None]
+
+    def _trail(self, scene: Scene, log: DiagnosticLog) -> Array:
+        from .configurations import of_file
+
+        return np.asarray(of_file(scene, str(self.trail), self.radians, self.options.limits, log).q)

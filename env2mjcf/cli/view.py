@@ -1,0 +1,118 @@
+"""`env2mjcf view`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import webbrowser
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from tyro.conf import Positional
+
+from ..errors import DiagnosticLog
+from ..options import Options, PathArgument
+from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .printing import print_diagnostics, print_json, working
+
+if TYPE_CHECKING:
+    from ..simulation.scene import Scene
+    from ..transforms import Array
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Show a scene on a web page: a slider for each degree of freedom, live contacts, and paths that play.
+
+    The page is served to this machine alone (127.0.0.1); its address is printed. Sliders have the file's own units.
+    Ctrl-C ends it.
+
+    Examples:
+      env2mjcf view serial.env --query serial.query
+      env2mjcf view serial.env --path serial.path
+      env2mjcf view problem.xml --no-browser --port 8090
+      env2mjcf view serial.env --native
+
+    Attributes:
+        scene: An env file, an XML environment or a problem XML.
+        path: A path to be played: a .path file, or rows of numbers as `check` reads them.
+        port: Where the page is served; a free port from 8080 on if it is not given.
+        browser: Open the page in a browser.
+        native: Open MuJoCo's own viewer instead of the page.
+        output: How to report.
+        options: What may be chosen.
+    """
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
+    path: PathArgument | None = None
+    port: int | None = None
+    browser: bool = True
+    native: bool = False
+    output: OutputFlags = field(default_factory=Output)
+    options: OptionFlags = field(default_factory=Options)
+
+    def run(self) -> int:
+        """Show the scene until Ctrl-C."""
+        from ..view import native, web_server
+
+        if self.native:
+            native.require_display()
+            if self.path is not None:
+                raise ValueError("--native plays no path: leave one of --native and --path out")
+        else:
+            web_server.require()
+        from ..simulation.preparing import load
+
+        with working(f"loading {self.scene}"):
+            scene = load(self.scene, **keywords(self.options))
+        log = DiagnosticLog(self.options.strict)
+        log.extend(scene.diagnostics)
+        path = None if self.path is None else self._path(scene, log)
+        print_diagnostics(log, self.output.verbose)
+        if self.native:
+            native.show(scene, scene.queries[0].q[0] if scene.queries else scene.space.home)
+            return 0
+        return self._serve(scene, path)
+
+    def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
+        from ..view.playback import doubts
+        from .configurations import of_file
+
+        q = of_file(scene, str(self.path), False, self.options.limits, log).q
+        doubts(scene, q, str(self.path), log)
+        return q
+
+    def _serve(self, scene: Scene, path: Array | None) -> int:
+        from ..view import web_server
+        from ..view.viewer import Viewer
+
+        port = web_server.free_port(self.port)
+        try:
+            with web_server.serving(port, f"env2mjcf: {scene.environment.name}") as server:
+                viewer = Viewer(server, scene, path)
+                self._announce(server.get_port())
+                try:
+                    threading.Event().wait()
+                finally:
+                    viewer.close()
+        except KeyboardInterrupt:
+            pass
+        return 0
+
+    def _announce(self, port: int) -> None:
+        url = f"http://127.0.0.1:{port}"
+        if self.output.json:
+            print_json({"url": url, "port": port})
+        else:
+            print(url)
+        sys.stdout.flush()
+        print("the page is served to this machine alone; Ctrl-C ends", file=sys.stderr)
+        if self.browser and _has_screen():
+            webbrowser.open(url)
+
+
+def _has_screen() -> bool:
+    # Without one, a browser of text might take over the terminal.
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,0 +1,103 @@
+"""Between a file's own numbers and configurations of a scene; and onto the disk."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import ConversionError, DiagnosticLog
+from ..formats.path import ALL_ROBOTS
+from ..model import Dialect
+from ..options import PathArgument
+from ..simulation.scene import Scene
+from ..space import ConfigurationSpace
+from ..transforms import Array
+from ..writing import replaced
+
+
+def dofs_of(scene: Scene) -> list[int]:
+    """Return the number of degrees of freedom of each robot."""
+    return [s.stop - s.start for s in scene.space.robot_slices]
+
+
+def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) -> Array:
+    """Return rows (robot, its numbers in the file) as (n, dim), the other robots at home."""
+    space = scene.space
+    q = np.tile(space.home, (len(rows), 1))
+    for robot in {r for r, _ in rows}:
+        columns = slice(0, space.dim) if robot == ALL_ROBOTS else space.robot_slices[robot]
+        own = [i for i, (r, _) in enumerate(rows) if r == robot]
+        numbers = np.zeros((len(own), space.dim))
+        numbers[:, columns] = [rows[i][1] for i in own]
+        q[own, columns] = space.decode(numbers)[:, columns]
+    return q
+
+
+def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
+    """Return one robot's numbers of configurations (n, dim) as they are written.
+
+    Decoding them gives q again to the last bit wherever some number does; else it is one unit of the last digit off,
+    because not every double is a multiple of pi.
+
+    Raises:
+        ValueError: q has a wrong shape or value, or there is no such robot.
+    """
+    space = scene.space
+    columns = columns_of(scene, robot)
+    rows = np.atleast_2d(space.check(q))
+    return _exactly(space, rows)[:, columns].tolist()
+
+
+def columns_of(scene: Scene, robot: int) -> slice:
+    """Return the columns of a robot.
+
+    Raises:
+        ValueError: There is no such robot.
+    """
+    count = len(scene.space.robot_slices)
+    if not 0 <= robot < count:
+        raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
+    return scene.space.robot_slices[robot]
+
+
+def written_index(scene: Scene, robot: int) -> int | None:
+    """Return the index that a robot's configurations begin with; None where the dialect writes none.
+
+    Dialects B to D write one, A and E none (env-format section 9.6); where there are several robots, nothing else
+    would tell them apart.
+    """
+    plain = scene.environment.dialect in (Dialect.A, Dialect.E) and len(scene.space.robot_slices) == 1
+    return None if plain else robot
+
+
+def write(file: PathArgument, text: str) -> Path:
+    """Write a text, whole or not at all.
+
+    Raises:
+        ConversionError: It cannot be written.
+    """
+    path = Path(os.fspath(file))
+    try:
+        with replaced(path) as beside:
+            beside.write_bytes(text.encode("utf-8"))
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        DiagnosticLog().fail(
+            ConversionError, "CFG532", str(path), f"{path} cannot be written: {reason}",
+            hint="choose another file; its folder must exist",
+        )  # fmt: skip
+    return path
+
+
+def _exactly(space: ConfigurationSpace, q: Array) -> Array:
+    numbers = space.encode(q)
+    best = numbers.copy()
+    wrong = space.decode(best) != q
+    for neighbour in (np.nextafter(numbers, -np.inf), np.nextafter(numbers, np.inf)):
+        better = wrong & (space.decode(neighbour) == q)
+        best[better] = neighbour[better]
+    return best

@@ -1,0 +1,195 @@
+"""Roadmaps of a scene: configurations, and the straight ways between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import Diagnostic, DiagnosticLog
+from ..formats import roadmap as text
+from ..formats.graph import Edge, Node
+from ..formats.source import Source, read_source
+from ..options import Limits, PathArgument
+from ..simulation.scene import Scene
+from ..transforms import Array
+from .adjacency import undirected
+from .numbers import configurations, dofs_of, file_numbers, write, written_index
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roadmap:
+    """A graph of configurations, whose edges have no direction and are there once.
+
+    `Roadmap.of` makes one out of nodes and edges alone.
+
+    Attributes:
+        q: (n, dim) nodes in metres and radians, the other robots at home.
+        edges: (m, 2) indices into `q`; in what was read, the lower one first, and in order.
+        weights: (m,) lengths as the planner measured them.
+        intermediates: For each edge its (k, dim) configurations on the way from `edges[i, 0]` to `edges[i, 1]`, both
+            ends left out.
+        vids: (n,) ids of the nodes.
+        robots: (n,) index of the robot that each node belongs to.
+        info: (n, 3) obstacle, tag and clearance of each node; NaN where the file has none. Not written.
+        planners: (m,) index of the local planner that made each edge; -1 where the file has none. Not written.
+        lines: (n,) line of the file that each node stands on; zero for what was not read.
+        header: What stands above the graph; only the name of the environment is written.
+        file: Its name.
+        diagnostics: What was found.
+    """
+
+    q: Array
+    edges: Indices
+    weights: Array
+    intermediates: tuple[Array, ...]
+    vids: Indices
+    robots: Indices
+    info: Array
+    planners: Indices
+    lines: Indices
+    header: text.RoadmapHeader = field(default_factory=text.RoadmapHeader)
+    file: str = ""
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        q: ArrayLike,
+        edges: ArrayLike,
+        weights: ArrayLike | None = None,
+        intermediates: Sequence[ArrayLike] | None = None,
+        robot: int = 0,
+    ) -> Roadmap:
+        """Make a roadmap.
+
+        Args:
+            q: (n, dim) nodes.
+            edges: (m, 2) indices into them.
+            weights: (m,) lengths; None takes straight distances in q.
+            intermediates: For each edge (k, dim) configurations between its ends; None means none.
+            robot: Whose it is.
+
+        Raises:
+            ValueError: Shapes do not belong together, or an edge has an index that is none.
+        """
+        nodes = np.asarray(q, dtype=np.float64)
+        pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
+        n, m = len(nodes), len(pairs)
+        if nodes.ndim != 2:
+            raise ValueError(f"nodes of shape {nodes.shape}; expected (n, dim)")
+        if m and not (pairs.min() >= 0 and pairs.max() < n):
+            raise ValueError(f"edges hold an index outside 0 to {n - 1}, the nodes")
+        lengths = np.linalg.norm(nodes[pairs[:, 1]] - nodes[pairs[:, 0]], axis=1)
+        given = lengths if weights is None else np.asarray(weights, dtype=np.float64)
+        between = [np.zeros((0, nodes.shape[1]))] * m if intermediates is None else list(intermediates)
+        if given.shape != (m,) or len(between) != m:
+            raise ValueError(
+                f"{given.shape} weights and {len(between)} intermediates; expected one for each of {m} edges"
+            )
+        ways = tuple(np.asarray(b, dtype=np.float64).reshape(-1, nodes.shape[1]) for b in between)
+        none = np.zeros(n, dtype=np.int64)
+        return cls(
+            nodes, pairs, given, ways, np.arange(n), none + robot, np.full((n, 3), np.nan),
+            np.full(m, -1, dtype=np.int64), none,
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def way(self, edge: int) -> Array:
+        """Return the corners of an edge, both ends included, (k, dim)."""
+        start, end = self.q[self.edges[edge]]
+        return np.concatenate([start[None], self.intermediates[edge], end[None]])
+
+
+def read_roadmap(scene: Scene, file: PathArgument, *, limits: Limits | None = None, strict: bool = False) -> Roadmap:
+    """Read a roadmap file of any version for a scene.
+
+    Args:
+        scene: Whose roadmap it is.
+        file: A roadmap file.
+        limits: Bounds on hostile input.
+        strict: Whether warnings are errors.
+
+    Raises:
+        FormatError: The file cannot be read, is cut off, or is the roadmap of another robot.
+    """
+    log = DiagnosticLog(strict)
+    return roadmap_record(scene, read_source(file, log, limits or Limits()), log)
+
+
+def roadmap_record(scene: Scene, source: Source, log: DiagnosticLog) -> Roadmap:
+    """Read a roadmap from a text; see `read_roadmap`."""
+    found = text.read_roadmap(source, dofs_of(scene), log)
+    if found.dropped:
+        log.info("CFG531", source.path, f"{found.dropped} are not used")
+    nodes = found.nodes
+    q = configurations(scene, [(n.robot, n.configuration) for n in nodes])
+    kept = undirected(source, nodes, log)
+    robots = np.array([n.robot for n in nodes], dtype=np.int64)
+    edges = np.array([pair for pair, _ in kept], dtype=np.int64).reshape(-1, 2)
+    between = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
+    stops = np.cumsum([0, *(len(edge.intermediates) for _, edge in kept)])
+    corners = configurations(scene, between)
+    info = np.array([(*n.info, *[np.nan] * (3 - len(n.info))) for n in nodes], dtype=np.float64).reshape(-1, 3)
+    return Roadmap(
+        q,
+        edges,
+        np.array([edge.weight for _, edge in kept], dtype=np.float64),
+        tuple(corners[a:b] for a, b in pairwise(stops)),
+        np.array([n.vid for n in nodes], dtype=np.int64),
+        robots,
+        info,
+        np.array([-1 if edge.planner is None else edge.planner for _, edge in kept], dtype=np.int64),
+        np.array([n.line for n in nodes], dtype=np.int64),
+        found.header,
+        source.path,
+        tuple(log),
+    )
+
+
+def write_roadmap(scene: Scene, roadmap: Roadmap, file: PathArgument) -> Path:
+    """Write a roadmap as the planners since 2012 read it, whole or not at all.
+
+    Every edge is written at both of its ends, with its weight and intermediates; numbers have 17 digits, as in
+    `write_path`. What that version has no place for (info fields, local planners, preamble, seed) is not written.
+
+    Args:
+        scene: Whose roadmap it is.
+        roadmap: What to write.
+        file: The file to write; replaced if it exists.
+
+    Raises:
+        ConversionError: The file cannot be written.
+        ValueError: A configuration has a wrong shape or a value that is not finite, or there is no such robot.
+    """
+    named = roadmap.header.environment or Path(scene.environment.path).name
+    index = written_index(scene, 0) is not None
+    return write(file, text.roadmap_text(_nodes(scene, roadmap), named, index=index))
+
+
+def _nodes(scene: Scene, roadmap: Roadmap) -> list[Node]:
+    numbers: list[list[float]] = [[]] * len(roadmap)
+    for robot in np.unique(roadmap.robots).tolist():
+        own = np.flatnonzero(roadmap.robots == robot)
+        for i, row in zip(own.tolist(), file_numbers(scene, roadmap.q[own], robot), strict=True):
+            numbers[i] = row
+    ends: list[list[Edge]] = [[] for _ in range(len(roadmap))]
+    vids, robots = roadmap.vids.tolist(), roadmap.robots.tolist()
+    for (i, j), weight, way in zip(
+        roadmap.edges.tolist(), roadmap.weights.tolist(), roadmap.intermediates, strict=True
+    ):
+        between = tuple(map(tuple, file_numbers(scene, way, robots[i]))) if len(way) else ()
+        ends[i].append(Edge(vids[j], weight, None, between))
+        ends[j].append(Edge(vids[i], weight, None, between[::-1]))
+    return [
+        Node(vids[i], robots[i], tuple(numbers[i]), (), tuple(sorted(ends[i], key=lambda e: e.target)), 0)
+        for i in range(len(roadmap))
+    ]

@@ -1,0 +1,188 @@
+"""Roadmap files of all ages: graphs of configurations (env-format section 13.3)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from ..errors import DiagnosticLog, FormatError, Span
+from .graph import Node, read_nodes
+from .rows import row_text
+from .source import Source
+
+_START, _STOP = "#####GRAPHSTART#####", "#####GRAPHSTOP#####"
+_GRAPH_START = re.compile(r"\S*GRAPHSTART\S*")
+_GRAPH_STOP = re.compile(r"\S*GRAPHSTOP\S*")
+_SECTION = re.compile(r"#{3,}(PREAMBLE|ENVFILE|LP|CD|DM|RNGSEED)START#{3,}[ \t]*")
+_VERSION = re.compile(r"\s*(PMPL )?Roadmap Version( Number)?\s+(\S+)", re.IGNORECASE)
+_COUNTS = re.compile(r"\s*(\S+)\s+(\S+)\s+(\S+)")
+
+
+@dataclass(frozen=True, slots=True)
+class RoadmapHeader:
+    """What stands above the graph of a roadmap.
+
+    Attributes:
+        version: As it is written, such as "061300"; empty in files since 2012, which have none.
+        environment: The env file that it names.
+        preamble: The command that made it.
+        local_planners, collision_detectors, distance_metrics: A line each.
+        seed: Of the random numbers.
+    """
+
+    version: str = ""
+    environment: str = ""
+    preamble: str = ""
+    local_planners: tuple[str, ...] = ()
+    collision_detectors: tuple[str, ...] = ()
+    distance_metrics: tuple[str, ...] = ()
+    seed: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadmapFile:
+    """A roadmap file in its own numbers.
+
+    Attributes:
+        header: What stands above the graph.
+        nodes: In file order; each with its edges, so that an edge stands at both of its ends.
+        dropped: What stands in nodes and is not used, such as "velocities"; empty where nothing does.
+    """
+
+    header: RoadmapHeader
+    nodes: tuple[Node, ...]
+    dropped: str = field(default="")
+
+
+@dataclass(frozen=True, slots=True)
+class _Counts:
+    nodes: int
+    edges: int
+    span: Span
+
+
+def is_roadmap(source: Source) -> bool:
+    """Whether a text holds what only roadmaps hold."""
+    return _GRAPH_START.search(source.text) is not None
+
+
+def read_roadmap(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> RoadmapFile:
+    """Read a roadmap of any version.
+
+    How nodes and edges are built is found by trying, what the version suggests first: numbers that are no whole
+    numbers where whole ones must stand tell. Declared counts are compared with what is there, not believed.
+
+    Args:
+        source: The file.
+        dofs: Number of degrees of freedom of each robot.
+        log: Where findings go.
+
+    Raises:
+        FormatError: It is no roadmap, is cut off, or is one of another robot.
+    """
+    start = _GRAPH_START.search(source.text)
+    if start is None:
+        log.fail(
+            FormatError, "CFG520", source.path, f"{source.path} holds no graph; expected a line '{_START}'",
+            hint="is it a roadmap, and whole?", span=source.line_span(1),
+        )  # fmt: skip
+    header = _read_header(source, start.start(), log)
+    stop = _GRAPH_STOP.search(source.text, start.end())
+    end = stop.start() if stop else len(source.text)
+    counts, begin = _read_counts(source, start.end(), end, log)
+    nodes, dropped = read_nodes(source, (begin, end), counts.nodes, dofs, header.version, log)
+    _compare(source, counts, nodes, whole=stop is not None, log=log)
+    return RoadmapFile(header, nodes, dropped)
+
+
+def roadmap_text(nodes: Iterable[Node], environment: str, *, index: bool) -> str:
+    """Return a roadmap as the planners since 2012 read it, with 17 digits.
+
+    Args:
+        nodes: With every edge at both of its ends.
+        environment: Name of the env file.
+        index: Whether the robot's index stands in front of each configuration.
+    """
+    listed = list(nodes)
+    lines = ["#####ENVFILESTART#####", environment, "#####ENVFILESTOP#####", _START]
+    edges = sum(len(node.edges) for node in listed)
+    lines.append(f"{len(listed)} {edges} {max((node.vid for node in listed), default=-1) + 1}")
+    for node in listed:
+        robot = node.robot if index else None
+        words = [str(node.vid), row_text(node.configuration, robot), str(len(node.edges))]
+        for edge in node.edges:
+            between = (row_text(row, robot) for row in edge.intermediates)
+            words += [str(edge.target), str(len(edge.intermediates)), *between, f"{edge.weight:.16e}"]
+        lines.append(" ".join(words))
+    return "\n".join([*lines, _STOP]) + "\n"
+
+
+def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
+    version = _VERSION.match(source.text, 0, end)
+    sections = {m[1]: _section(source, m, end, log) for m in _SECTION.finditer(source.text, 0, end)}
+
+    def lines(name: str) -> tuple[str, ...]:
+        # The first line says how many follow.
+        return tuple(line.strip() for line in sections.get(name, [])[1:])
+
+    def text(name: str) -> str:
+        return "\n".join(sections.get(name, [])).strip()
+
+    return RoadmapHeader(
+        version[3] if version else "", text("ENVFILE"), text("PREAMBLE"), lines("LP"), lines("CD"), lines("DM"),
+        text("RNGSEED"),
+    )  # fmt: skip
+
+
+def _section(source: Source, begin: re.Match[str], end: int, log: DiagnosticLog) -> list[str]:
+    stop = re.compile(rf"#{{3,}}{begin[1]}STOP#{{3,}}").search(source.text, begin.end(), end)
+    if stop is None:
+        log.warn(
+            FormatError, "CFG530", source.path, f"this section has no end; expected '#####{begin[1]}STOP#####'",
+            hint="it is not used", span=source.span(begin.start(), begin.end()),
+        )  # fmt: skip
+        return []
+    return [line for line in re.split(r"\r\n?|\n", source.text[begin.end() : stop.start()]) if line.strip()]
+
+
+def _read_counts(source: Source, begin: int, end: int, log: DiagnosticLog) -> tuple[_Counts, int]:
+    match = _COUNTS.match(source.text, begin, end)
+    words = [str(w) for w in match.groups()] if match else []
+    if match is None or not all(re.fullmatch("[0-9]{1,18}", w) for w in words):
+        found = source.text[begin:end].split(maxsplit=3)[:3]
+        at = begin + len(source.text[begin:end]) - len(source.text[begin:end].lstrip())
+        log.fail(
+            FormatError, "CFG521", source.path,
+            f"expected three counts (nodes, edges, next node) behind GRAPHSTART, found {' '.join(found)[:60]!r}",
+            hint="is the file cut off?", span=source.span(min(at, max(0, len(source.text) - 1))),
+        )  # fmt: skip
+    return _Counts(int(words[0]), int(words[1]), source.span(match.start(1), match.end(3))), match.end()
+
+
+def _compare(source: Source, counts: _Counts, nodes: Sequence[Node], *, whole: bool, log: DiagnosticLog) -> None:
+    """Compare declared counts with what was read."""
+    if not whole and len(nodes) < counts.nodes:
+        log.fail(
+            FormatError, "CFG522", source.path,
+            f"the roadmap ends behind {len(nodes)} of {counts.nodes} nodes, without GRAPHSTOP",
+            hint="is the file cut off?", span=source.span(max(0, len(source.text.rstrip()) - 1)),
+        )  # fmt: skip
+    if not whole:
+        log.warn(
+            FormatError, "CFG524", source.path, f"the roadmap ends without '{_STOP}'", hint="is the file cut off?",
+            span=source.span(max(0, len(source.text.rstrip()) - 1)),
+        )  # fmt: skip
+    if len(nodes) != counts.nodes:
+        log.warn(
+            FormatError, "CFG523", source.path, f"declares {counts.nodes} nodes, and has {len(nodes)}",
+            hint=f"write {len(nodes)}", span=counts.span,
+        )  # fmt: skip
+    entries = sum(len(node.edges) for node in nodes)
+    # Up to 061300 an edge was counted once, later at both of its ends (env-format section 13.3).
+    if counts.edges not in (entries, entries / 2):
+        log.warn(
+            FormatError, "CFG523", source.path,
+            f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge",
+            hint=f"write {entries}, or {entries // 2} up to version 061300", span=counts.span,
+        )  # fmt: skip

@@ -1,0 +1,194 @@
+"""Rows of numbers that are configurations, as query and path files hold them (env-format sections 9.6 and 13)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ..errors import DiagnosticLog, FormatError, Span
+from .lexer import number_hint, parse_number
+from .source import Source
+
+_WORD = re.compile(r"\S+")
+_COMMENT = re.compile(r"#|//")
+# Dialect A's InfoCfg wrote three numbers behind some configurations.
+_LEGACY_INFO_FIELDS = 3
+
+
+class Extra(StrEnum):
+    """What follows a configuration and is not used."""
+
+    NOTHING = "nothing"
+    VELOCITIES = "velocities"
+    INFO_FIELDS = "info fields"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One configuration as it was written.
+
+    Attributes:
+        robot: Index of the robot.
+        configuration: As long as the robot has degrees of freedom.
+        indexed: Whether the robot's index stands in front.
+        extra: What stands behind.
+    """
+
+    robot: int
+    configuration: tuple[float, ...]
+    indexed: bool
+    extra: Extra
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The numbers of a line, and its place."""
+
+    numbers: tuple[float, ...]
+    span: Span
+
+
+def split_row(numbers: Sequence[float], dofs: Sequence[int]) -> tuple[int, tuple[float, ...]] | None:
+    """Return (robot, configuration) of one row, or None where the row fits no robot."""
+    row = parse_row(numbers, dofs)
+    return None if row is None else (row.robot, row.configuration)
+
+
+def parse_row(numbers: Sequence[float], dofs: Sequence[int]) -> Row | None:
+    """Tell what the numbers of one row are, or None where they fit no robot."""
+    if not dofs or not numbers:
+        return None
+    plain = _extra(len(numbers), dofs[0], legacy=True)
+    # A lone robot's exact width needs no index; several robots always have one (env-format section 9.6).
+    if plain is Extra.NOTHING and len(dofs) == 1:
+        return Row(0, tuple(numbers), False, plain)
+    first = numbers[0]
+    if first.is_integer() and 0 <= first < len(dofs):
+        robot = int(first)
+        extra = _extra(len(numbers) - 1, dofs[robot], legacy=False)
+        if extra is not None:
+            return Row(robot, tuple(numbers[1 : 1 + dofs[robot]]), True, extra)
+    return None if plain is None else Row(0, tuple(numbers[: dofs[0]]), False, plain)
+
+
+def number_lines(source: Source, log: DiagnosticLog, start: int = 0) -> list[Line]:
+    """Split the text from `start` on into rows of numbers.
+
+    A word ends the list, as it ends the planner's stream extraction.
+
+    Raises:
+        FormatError: A word looks like a number that went wrong, or the text begins with a word.
+    """
+    lines: list[Line] = []
+    for begin, text in source.lines():
+        skipped = max(0, min(start - begin, len(text)))
+        numbers: list[float] = []
+        span = source.span(begin)
+        for match in _WORD.finditer(_COMMENT.split(text, maxsplit=1)[0], skipped):
+            place = source.span(begin + match.start(), begin + match.end())
+            value = parse_number(match.group())
+            if value is None:
+                _end_list(source, match.group(), place, log, empty=not lines and not numbers)
+                return [*lines, Line(tuple(numbers), span)] if numbers else lines
+            span = span if numbers else place
+            numbers.append(value)
+        if numbers:
+            lines.append(Line(tuple(numbers), span))
+    return lines
+
+
+def _extra(width: int, dof: int, *, legacy: bool) -> Extra | None:
+    known = {dof: Extra.NOTHING, 2 * dof: Extra.VELOCITIES}
+    if legacy:
+        known.setdefault(dof + _LEGACY_INFO_FIELDS, Extra.INFO_FIELDS)
+    return known.get(width)
+
+
+def _end_list(source: Source, word: str, place: Span, log: DiagnosticLog, *, empty: bool) -> None:
+    # What looks like a number is one that went wrong, not text behind the list.
+    hint = number_hint(word)
+    if empty or hint or word[0] in "+-.0123456789":
+        log.fail(
+            FormatError, "CFG502", source.path, f"expected a number, found {word[:60]!r}",
+            hint=hint or "write one configuration a line, '#' before comments", span=place,
+        )  # fmt: skip
+    log.warn(
+        FormatError, "CFG501", source.path, "text ends the list of configurations here",
+        hint="begin comment lines with '#'", span=place,
+    )  # fmt: skip
+
+
+def regrouped(lines: Sequence[Line], dofs: Sequence[int]) -> Sequence[Line]:
+    """Read numbers that run over lines, all configurations of one width, as the planner's stream extraction does.
+
+    Lines whose first fits a robot, or that cannot be cut so, are returned as they are.
+    """
+    d = dofs[0] if dofs else 0
+    # A first line that is too long belongs to another robot; only one that is too short goes on in the next.
+    if not lines or parse_row(lines[0].numbers, dofs) is not None or len(lines[0].numbers) > d:
+        return lines
+    flat = [(x, line.span) for line in lines for x in line.numbers]
+    for width in (d, d + 1, 2 * d + 1, 2 * d):
+        if len(flat) < 2 * width or len(flat) % width:
+            continue
+        cut = [flat[i : i + width] for i in range(0, len(flat), width)]
+        found = [Line(tuple(x for x, _ in piece), piece[0][1]) for piece in cut]
+        if all(parse_row(line.numbers, dofs) is not None for line in found):
+            return found
+    return lines
+
+
+def fitting(source: Source, line: Line, dofs: Sequence[int], log: DiagnosticLog, what: str) -> Row:
+    """Return what a line is.
+
+    Args:
+        source: The file.
+        line: Its numbers.
+        dofs: Number of degrees of freedom of each robot.
+        log: Where findings go.
+        what: What the file is, for the message.
+
+    Raises:
+        FormatError: It fits no robot.
+    """
+    row = parse_row(line.numbers, dofs)
+    if row is None:
+        expected = " or ".join(f"{d} (robot {i})" for i, d in enumerate(dofs)) or "none: the scene has no robot"
+        log.fail(
+            FormatError, "CFG504", source.path,
+            f"a row of {len(line.numbers)} numbers; expected as many as a robot has degrees of freedom, {expected}, "
+            "behind the robot's index or, for robot 0, without",
+            hint=f"is it the {what} of another scene, or cut off?", span=line.span,
+        )  # fmt: skip
+    return row
+
+
+def judge_rows(source: Source, rows: Iterable[tuple[Row, Span]], log: DiagnosticLog) -> None:
+    """Report what is doubtful about rows that each fit: different makes, and numbers that are dropped."""
+    listed = list(rows)
+    if not listed:
+        return
+    first = listed[0][0]
+    odd = next((span for row, span in listed if (row.indexed, row.extra) != (first.indexed, first.extra)), None)
+    if odd is not None:
+        log.warn(
+            FormatError, "CFG506", source.path, "a row that is built otherwise than the first one",
+            hint="give every row, or none, a robot index and velocities", span=odd,
+        )  # fmt: skip
+    dropped = next(((row, span) for row, span in listed if row.extra is not Extra.NOTHING), None)
+    if dropped is not None:
+        row, span = dropped
+        log.info("CFG507", source.path, f"{row.extra} behind the configurations are not used", span=span)
+
+
+def row_text(configuration: Iterable[float], index: int | None = None) -> str:
+    """Return a configuration as the planner writes it: 17 digits, so that it reads back as the same doubles.
+
+    Args:
+        configuration: The file's own numbers.
+        index: The robot's index, written in front; None writes none.
+    """
+    numbers = " ".join(f"{value:25.16e}" for value in configuration)
+    return numbers if index is None else f"{index} {numbers}"

@@ -1,0 +1,186 @@
+"""Says of each edge of a path or roadmap whether it is valid, and where it first is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.paths import EdgeSteps
+from ..transforms import Array
+from .scene import Scene
+from .verdicts import Judge, Verdict
+
+Indices = NDArray[np.int64]
+
+# Configurations that are asked about at once: enough for all cores, few enough to stay in memory.
+_BLOCK = 100_000
+# More checks than this take hours: the step is a slip.
+_MOST_CHECKS = 1e10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """Ways between configurations: straight, or through others.
+
+    Attributes:
+        q: (n, dim) nodes.
+        ends: (m, 2) indices into them.
+        between: For each edge (k, dim) configurations on its way; empty where no edge has any.
+        labels: What each is called.
+    """
+
+    q: Array
+    ends: Indices
+    between: tuple[Array, ...]
+    labels: Sequence[str]
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def pieces(self) -> tuple[Array, Array, Indices]:
+        """Return the straight pieces in order: where they begin and end, (s, dim) each, and of which edge they are."""
+        if not self.between:
+            return self.q[self.ends[:, 0]], self.q[self.ends[:, 1]], np.arange(len(self.ends))
+        dim = self.q.shape[1]
+        corners = [
+            np.concatenate([self.q[[i]], b, self.q[[j]]]) for (i, j), b in zip(self.ends, self.between, strict=True)
+        ]
+        owner = np.repeat(np.arange(len(corners)), [len(c) - 1 for c in corners])
+        starts = np.concatenate([np.zeros((0, dim)), *(c[:-1] for c in corners)])
+        return starts, np.concatenate([np.zeros((0, dim)), *(c[1:] for c in corners)]), owner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EdgeVerdict:
+    """What is known of one edge.
+
+    Attributes:
+        label: What it is called.
+        start, end: Indices of its nodes.
+        valid: Whether nothing is wrong with it.
+        checked: Whether it was looked at: not where the file's poses belong to no configuration.
+        proved: Whether it is proved that nothing touches between the checks; None where that was not asked.
+        fraction: Where the first check fails, from 0 at its start to 1 at its end; None where none does.
+        at: What is wrong there.
+    """
+
+    label: str
+    start: int
+    end: int
+    valid: bool
+    checked: bool
+    proved: bool | None
+    fraction: float | None
+    at: Verdict | None
+
+
+class EdgeJudge:
+    """Judges edges of a scene: limits, boundary and contacts, at even steps.
+
+    Args:
+        scene: The scene.
+        edges: The edges.
+        resolution: As for `Scene.edge_in_collision`.
+        certified: Prove, too, that nothing touches between the steps.
+        checked: (m,) which edges to look at; None for all.
+
+    Raises:
+        ValueError: The resolution is not positive, or so small that the checks would not end.
+
+    Attributes:
+        resolution: The greatest distance in metres that any point moves between two checks.
+        valid: (m,) whether nothing is wrong.
+        checked: (m,) whether it was looked at.
+        stepped: (m,) whether no check failed.
+        proved: (m,) whether it is proved; None where that was not asked.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        edges: Edges,
+        resolution: float | None = None,
+        certified: bool = False,
+        checked: NDArray[np.bool_] | None = None,
+    ) -> None:
+        self._scene, self._edges = scene, edges
+        self._steps = EdgeSteps(scene.compiled.assembly, scene.space)
+        self.resolution = self._steps.resolution(resolution)
+        self.checked = np.ones(len(edges), dtype=bool) if checked is None else checked
+        self.valid = self.checked.copy()
+        self._fractions = np.full(len(edges), np.nan)
+        self._places = np.zeros((len(edges), scene.space.dim))
+        starts, ends, owner = edges.pieces()
+        kept = self.checked[owner]
+        starts, ends, owner = starts[kept], ends[kept], owner[kept]
+        self._walk(starts, scene.space.difference(starts, ends), owner)
+        self.stepped = self.valid.copy()
+        self.proved: NDArray[np.bool_] | None = None
+        if certified:
+            self.proved = self.valid.copy()
+            left = self.valid[owner]
+            free = scene.edge_is_free(starts[left], ends[left], progress=True)
+            self.proved[owner[left][~free]] = False
+            self.valid &= self.proved
+
+    def verdict(self, index: int) -> EdgeVerdict:
+        """Return all that is known of one edge."""
+        start, end = self._edges.ends[index].tolist()
+        fraction = float(self._fractions[index])
+        failed = isfinite(fraction)
+        return EdgeVerdict(
+            self._edges.labels[index],
+            start,
+            end,
+            bool(self.valid[index]),
+            bool(self.checked[index]),
+            None if self.proved is None else bool(self.proved[index]),
+            fraction if failed else None,
+            self._judge.verdict(int(self._rows[index])) if failed else None,
+        )
+
+    def rough(self, verdict: EdgeVerdict) -> bool:
+        """Whether a depth is that of a thin plate, not of a body."""
+        return verdict.at is not None and self._judge.rough(verdict.at)
+
+    @cached_property
+    def _rows(self) -> Indices:
+        """Row of `_judge` of each edge that fails a check."""
+        return np.cumsum(np.isfinite(self._fractions)) - 1
+
+    @cached_property
+    def _judge(self) -> Judge:
+        failed = np.isfinite(self._fractions)
+        labels = [self._edges.labels[i] for i in np.flatnonzero(failed).tolist()]
+        return Judge(self._scene, self._places[failed], labels)
+
+    def _walk(self, start: Array, delta: Array, owner: Indices) -> None:
+        """Check all edges at even steps, and note the first check of each that fails."""
+        counts = self._steps.counts(start, delta, self.resolution)
+        # A count that does not fit into its type has come out negative.
+        if counts.sum(dtype=np.float64) > _MOST_CHECKS or (counts < 2).any():
+            raise ValueError(f"resolution is {self.resolution}; in such steps the edges would take too many checks")
+        stops = np.cumsum(counts)
+        whole = np.bincount(owner, counts, minlength=len(self.valid))
+        passed = np.concatenate([[0], np.cumsum(whole)])
+        for block in _blocks(int(stops[-1]) if len(stops) else 0):
+            open_ = self.valid[owner[np.searchsorted(stops, block, side="right")]]
+            rows = block[open_]
+            piece = np.searchsorted(stops, rows, side="right")
+            at = rows - (stops - counts)[piece]
+            q = start[piece] + (at / (counts[piece] - 1))[:, None] * delta[piece]
+            bad = np.flatnonzero(~self._scene.is_valid(q, progress=True))
+            edges, first = np.unique(owner[piece[bad]], return_index=True)
+            self.valid[edges] = False
+            self._places[edges] = q[bad[first]]
+            self._fractions[edges] = (rows[bad[first]] - passed[edges]) / np.maximum(whole[edges] - 1, 1)
+
+
+def _blocks(total: int) -> Iterator[Indices]:
+    for begin in range(0, total, _BLOCK):
+        yield np.arange(begin, min(begin + _BLOCK, total))

@@ -1,0 +1,27 @@
+"""MuJoCo's own viewer, for those who sit before a screen."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from ..simulation.scene import Scene
+from ..transforms import Array
+
+
+def require_display() -> None:
+    """Make sure that a window can be opened.
+
+    Raises:
+        ValueError: There is no display.
+    """
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ValueError("--native opens a window, and there is no display: leave it out for the web page")
+
+
+def show(scene: Scene, q: Array) -> None:
+    """Open a window on a scene that begins at q, (dim,), and wait until it is closed."""
+    from mujoco import viewer
+
+    scene.set(q)
+    viewer.launch(scene.model, scene.data)

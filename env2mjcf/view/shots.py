@@ -1,0 +1,209 @@
+"""What a picture, or each picture of a film, shows; and how that is told to the process that draws."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import mujoco
+import numpy as np
+
+from ..dofs import DofKind
+from ..geometry.assembly import Part
+from ..mjcf.boundary import boundary_lines
+from ..simulation.scene import Scene
+from ..transforms import Array
+from .framing import FIELD_OF_VIEW, Camera, Viewpoint, candidates, fitted, named_direction
+from .marks import BAD, WIRE, Mark, Polyline
+from .offscreen import drawn
+
+# A boundary that is so much larger than all bodies is drawn as far as the picture reaches.
+_FAR_BOUNDARY = 2.0
+# Up to so many configurations are framed by all their vertices, more of them by the boxes of their links.
+_FEW = 4
+_TINT = 0.65
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One picture of a shot.
+
+    Attributes:
+        q: (dim,) the configuration.
+        touching: Names of bodies that are tinted, because they touch.
+        marks: Drawn in this picture only.
+    """
+
+    q: Array
+    touching: frozenset[str] = frozenset()
+    marks: tuple[Mark, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """Pictures from one camera.
+
+    Attributes:
+        scene: The scene.
+        frames: At least one picture.
+        size: Width and height in pixels.
+        camera: Where to look from: a viewpoint, a direction or the name of one; None to choose.
+        ghosts: (k, dim) configurations that are drawn nearly transparent, in every picture.
+        marks: Drawn in every picture.
+        see_through: Whether obstacles are transparent; None where robots are hidden else.
+        segmentation: Return which geom each pixel shows, instead of colours.
+        only: Names of the bodies that are drawn; None for all.
+    """
+
+    scene: Scene
+    frames: Sequence[Frame]
+    size: tuple[int, int]
+    camera: Camera | None = None
+    ghosts: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    marks: tuple[Mark, ...] = ()
+    see_through: bool | None = None
+    segmentation: bool = False
+    only: frozenset[str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the process that draws has chosen.
+
+    Attributes:
+        camera: Where it looks from.
+        see_through: Whether obstacles are drawn transparent.
+    """
+
+    camera: Viewpoint
+    see_through: bool
+
+
+@contextmanager
+def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
+    """Draw a shot in a process of its own.
+
+    Yields:
+        What was chosen, and the stream that the pictures come out of; see `worker`.
+
+    Raises:
+        ValueError: The camera has an unknown name, or a size is not positive.
+        RenderError: It cannot be drawn here.
+    """
+    if min(shot.size) < 1:
+        raise ValueError(f"a picture of {shot.size[0]} x {shot.size[1]} pixels; expected at least 1 x 1")
+    points = _in_view(shot)
+    views = _views(shot, points)
+    with tempfile.TemporaryDirectory(prefix="env2mjcf-") as folder:
+        model = Path(folder) / "scene.mjb"
+        mujoco.mj_saveModel(shot.scene.model, str(model), None)
+        with drawn(_request(shot, views, points, model)) as (head, stream):
+            yield Answer(views[head["camera"]], head["see_through"]), stream
+
+
+def _views(shot: Shot, points: Array) -> list[Viewpoint]:
+    """Return the viewpoints that may be chosen from."""
+    if isinstance(shot.camera, Viewpoint):
+        return [shot.camera]
+    aspect = shot.size[0] / shot.size[1]
+    if shot.camera is None:
+        return [fitted(points, direction, aspect) for direction in candidates(_is_planar(shot.scene))]
+    direction = named_direction(shot.camera) if isinstance(shot.camera, str) else shot.camera
+    return [fitted(points, direction, aspect)]
+
+
+def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path) -> dict[str, Any]:
+    scene, assembly = shot.scene, shot.scene.compiled.assembly
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    geoms = {p.name: scene.model.geom(f"{p.name}:visual").id for p in assembly.parts()}
+    hidden = [] if shot.only is None else [g for name, g in geoms.items() if name not in shot.only]
+    return {
+        "model": str(model),
+        "size": list(shot.size),
+        "field_of_view": FIELD_OF_VIEW,
+        "center": center.tolist(),
+        "extent": max(_diagonal(points), 1e-9),
+        "cameras": [{"position": v.position, "forward": v.forward} for v in views],
+        "robots": [geoms[name] for name in scene.link_names],
+        "obstacles": [geoms[p.name] for p in (*assembly.obstacles, *assembly.surfaces)],
+        "hidden": hidden,
+        "see_through": shot.see_through,
+        "segmentation": shot.segmentation,
+        "ghosts": scene.space.qpos(shot.ghosts).tolist() if len(shot.ghosts) else [],
+        "marks": [mark.described() for mark in (*_boundary_marks(scene), *shot.marks)],
+        "frames": [_frame(shot, frame, geoms) for frame in shot.frames],
+    }
+
+
+def _frame(shot: Shot, frame: Frame, geoms: Mapping[str, int]) -> dict[str, Any]:
+    tints: list[tuple[int, list[float]]] = []
+    for name in sorted(frame.touching):
+        own = shot.scene.model.geom_rgba[geoms[name]]
+        tinted = (1 - _TINT) * own[:3] + _TINT * np.array(BAD[:3])
+        tints.append((geoms[name], [*tinted.tolist(), float(own[3])]))
+    qpos = shot.scene.space.qpos(frame.q).tolist()
+    return {"qpos": qpos, "tints": tints, "marks": [mark.described() for mark in frame.marks]}
+
+
+def _is_planar(scene: Scene) -> bool:
+    """Whether every robot that moves about does so in the plane."""
+    robots = scene.compiled.assembly.robots
+    bases = [{d.kind for d in r.kinematics.dofs if d.connection is None} for r in robots]
+    return any(bases) and not any(DofKind.Z in kinds for kinds in bases)
+
+
+def _boundary_marks(scene: Scene) -> list[Mark]:
+    boundary = scene.compiled.assembly.environment.boundary
+    # One that is asked for is part of the model.
+    if boundary is None or scene.compiled.options.boundary is not None:
+        return []
+    lines = boundary_lines(boundary, scene.compiled.assembly)
+    return [Polyline(np.array(line), WIRE, width=1.5) for line in lines]
+
+
+def _in_view(shot: Shot) -> Array:
+    """Return the points that the camera must see, (n, 3)."""
+    assembly = shot.scene.compiled.assembly
+    points = [_moved(_vertices(p), p.pose[None]) for p in (*assembly.obstacles, *assembly.surfaces)]
+    rows = _rows(shot)
+    poses = shot.scene.link_poses(rows)
+    shape = _vertices if len(rows) <= _FEW else _box
+    points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(p for r in assembly.robots for p in r.links)]
+    points += [np.asarray(mark.points, dtype=np.float64).reshape(-1, 3) for mark in shot.marks]
+    bodies = np.concatenate([np.zeros((0, 3)), *points])
+    if not len(bodies):
+        bodies = np.array([assembly.lower, assembly.upper])
+    wires = np.concatenate([np.zeros((0, 3)), *(np.array(mark.points) for mark in _boundary_marks(shot.scene))])
+    near = len(wires) and _diagonal(wires) < _FAR_BOUNDARY * _diagonal(bodies)
+    return np.concatenate([bodies, wires]) if near else bodies
+
+
+def _rows(shot: Shot) -> Array:
+    """Return all configurations that are drawn, (n, dim)."""
+    rows = np.array([frame.q for frame in shot.frames]).reshape(-1, shot.scene.space.dim)
+    return np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
+
+
+def _vertices(part: Part) -> Array:
+    """Return the vertices that a body's triangles use, (n, 3), in its own frame."""
+    return part.mesh.vertices[np.unique(part.mesh.faces)]
+
+
+def _box(part: Part) -> Array:
+    """Return the corners of the box around a body, (8, 3), in its own frame."""
+    used = _vertices(part)
+    return np.array(list(itertools.product(*zip(used.min(axis=0), used.max(axis=0), strict=True))))
+
+
+def _diagonal(points: Array) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _moved(points: Array, poses: Array) -> Array:
+    """Return points (k, 3) at each of n poses (n, 4, 4), (n * k, 3)."""
+    return (points @ np.swapaxes(poses[:, :3, :3], -1, -2) + poses[:, None, :3, 3]).reshape(-1, 3)
