@@ -28,7 +28,7 @@ def draw(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | No
     Raises:
         RenderError: It cannot be drawn here, or pillow is missing.
     """
-    from ..view.picture import picture
+    from ..view.pictures import picture
 
     q, wrong = _place(scene, rows, judge, edges)
     picture(scene, q, file=file, contacts=wrong, marks=_marks(scene, rows, judge, edges))

@@ -13,6 +13,10 @@ from .names import OMPL_PLANNERS
 from .space import PlanningSpace
 from .validity import Validity
 
+# The longest motion that trees grow by, in extents. OMPL's own is a fifth of the space: where the boundary is far
+# away, nearly every such motion would hit something, and the tree would not grow at all.
+_RANGE = 0.2
+
 
 class _Layout:
     """Where each degree of freedom stands in a state of OMPL."""
@@ -137,6 +141,8 @@ class OmplRun:
         self._planner = getattr(geometric, OMPL_PLANNERS[planner])(self._information)
         self._planner.setProblemDefinition(self._problem)
         self._planner.setup()
+        if hasattr(self._planner, "setRange"):
+            self._planner.setRange(min(self._planner.getRange(), _RANGE * space.extent))
 
     def solve(self, stop: Callable[[], bool]) -> bool:
         """Plan until there is a solution, or until it is to stop; return whether there is one."""

@@ -145,12 +145,12 @@ class Leg:
         return self._result(path, goal, resolution, solved=True)
 
     def _result(self, path: Array, goal: Array, resolution: float, *, solved: bool) -> LegResult:
-        dense = np.array([self._fine.motion(a, b) for a, b in pairwise(path)], dtype=bool)
+        # An approach is worth no more than a look in the planner's own steps.
+        look = self._fine if solved else self._watch.counts(Validity(self._scene, self._space, resolution))
+        dense = np.array([look.motion(a, b) for a, b in pairwise(path)], dtype=bool)
         certified = self._certified(path) & dense
         left = 0.0 if solved else self._space.distance(path[-1], goal)
-        return LegResult(
-            solved and bool(dense.all()), path, certified, dense, left, resolution, self._fine.resolution
-        )  # fmt: skip
+        return LegResult(solved and bool(dense.all()), path, certified, dense, left, resolution, look.resolution)
 
 
 def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> Run:

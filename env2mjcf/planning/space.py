@@ -58,11 +58,13 @@ class PlanningSpace:
         lower, upper: (d,) finite limits of what is drawn.
         turns: (d,) which are circles.
         weights: (d,) of the distance.
+        extent: Of the scene, in metres.
     """
 
     def __init__(self, scene: Scene, rows: Array, columns: NDArray[np.int64]) -> None:
         space = scene.space
         self.columns = columns
+        self.extent = scene.extent
         self.names = tuple(space.names[c] for c in columns)
         self.turns: NDArray[np.bool_] = space.periodic[columns]
         lower, upper = space.sample_limits

@@ -14,7 +14,7 @@ from .space import PlanningSpace
 
 # A motion is looked at in rounds: most invalid ones show in the first few configurations, and a round costs as much
 # as some ten of them.
-_ROUND, _GROWTH = 8, 4
+_ROUND, _GROWTH = 2, 4
 
 
 class Validity:
