@@ -99,17 +99,18 @@ def number_lines(source: Source, log: DiagnosticLog, start: int = 0) -> list[Lin
     for begin, text in source.lines():
         skipped = max(0, min(start - begin, len(text)))
         numbers: list[float] = []
-        span = source.span(begin)
+        first = begin, begin
         for match in _WORD.finditer(_COMMENT.split(text, maxsplit=1)[0], skipped):
-            place = source.span(begin + match.start(), begin + match.end())
             value = coordinate(match.group())
             if value is None:
+                place = source.span(begin + match.start(), begin + match.end())
                 _end_list(source, match.group(), place, log, empty=not lines and not numbers)
-                return [*lines, Line(tuple(numbers), span)] if numbers else lines
-            span = span if numbers else place
+                return [*lines, Line(tuple(numbers), source.span(*first))] if numbers else lines
+            if not numbers:
+                first = begin + match.start(), begin + match.end()
             numbers.append(value)
         if numbers:
-            lines.append(Line(tuple(numbers), span))
+            lines.append(Line(tuple(numbers), source.span(*first)))
     return lines
 
 
