@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..simulation.scene import Scene
 from ..transforms import Array
-from .names import AUTO, OPTIMISING
+from .expanding import ExpandingRun
+from .names import AUTO, BATCH, OPTIMISING
 from .shortening import shortened
 from .space import PlanningSpace
 from .turns import Run, Turns
@@ -154,6 +155,8 @@ class Leg:
 
 
 def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> Run:
+    if planner == BATCH:
+        return ExpandingRun(space, validity, start, goal, seed)
     # Imported here, because OMPL is an extra.
     bridge = import_module(".bridge", __package__)
     return bridge.OmplRun(space, validity, planner, start, goal, seed)
