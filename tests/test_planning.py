@@ -179,6 +179,26 @@ def test_motions_are_looked_at_everywhere_and_every_look_counts(maze: env2mjcf.S
         assert validity.motions == 1
 
 
+def test_many_motions_are_judged_as_each_of_them_is(maze: env2mjcf.Scene):
+    space = space_of(maze)
+    rows = space.draw(600, np.random.default_rng(2))
+    rows = rows[maze.is_valid(rows)][:200]
+    starts, ends = rows, space.enforced(rows + np.random.default_rng(3).normal(scale=0.3, size=rows.shape))
+    together, alone = (Validity(maze, space, 0.05) for _ in range(2))
+    verdicts = together.free(starts, ends)
+    assert verdicts.tolist() == [alone.motion(a, b) for a, b in zip(starts, ends, strict=True)]
+    assert 20 < verdicts.sum() < 180
+    assert together.motions == alone.motions == 200
+
+
+def test_the_bug_gets_out_of_its_bottle():
+    scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
+    start, goal = scene.queries[0].q
+    found = plan(scene, start, goal, planner="BatchEST", time=60)
+    assert_leads(scene, found, start, goal)
+    assert_free_by_triangles(scene, found.path, 0.01)
+
+
 def test_what_stays_does_not_move():
     scene = env2mjcf.load(MODELS / "two-robots/two-robots.env", query=MODELS / "two-robots/two-robots.query")
     query = scene.queries[1]
@@ -195,6 +215,7 @@ def test_the_maze_is_solved_and_triangles_agree(maze: env2mjcf.Scene):
     query = maze.queries[0]
     found = plan(maze, query.q[0], query.q[-1], time=60)
     assert_leads(maze, found, query.q[0], query.q[-1])
+    assert found.planner in ("RRTConnect", "BatchEST")
     assert found.certified.all()
     assert maze.edge_is_free(found.path[:-1], found.path[1:]).all()
     assert found.length == pytest.approx(space_of(maze).path_length(found.path))
@@ -281,7 +302,7 @@ def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):
     [
         ({"goal": [0.3, 0, 0]}, r"the goal is not valid: cube and cube_2 \(obstacle\)"),
         ({"start": [-3.9, 0, 0]}, r"the start is not valid: outside: cube"),
-        ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT\)"),
+        ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT, BatchEST\)"),
         ({"robot": 1}, "there is no robot 1; the scene has 1"),
         ({"time": 0}, "time is 0"),
         ({"seed": -1}, "seed is -1"),
@@ -299,11 +320,11 @@ def test_what_cannot_be_planned_is_said(arguments: dict[str, Any], message: str,
 
 
 def rows_of(path: Path) -> np.ndarray:
-    """The configurations of a path file, read as its format says."""
+    """The configurations of a path file, read as its format says; of three numbers, behind the robot's index if any."""
     header, links, count, *rows = path.read_text().splitlines()
     assert re.fullmatch(r"VIZMO_PATH_FILE   Path Version \d+", header)
     assert (links, int(count)) == ("1", len(rows))
-    return np.array([[float(x) for x in row.split()] for row in rows])
+    return np.array([[float(x) for x in row.split()[-3:]] for row in rows])
 
 
 def test_a_path_is_written_and_leads_from_start_to_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -351,7 +372,7 @@ def test_without_a_solution_the_status_is_1_and_the_approach_is_written(room: Pa
     words = ["plan", str(room / "shut.env"), "--query", str(room / "cross.query"), "--time", "0.5"]
     assert main([*words, "-o", str(room / "shut.path")]) == 1
     shown = capsys.readouterr().out
-    assert "not solved by auto" in shown
+    assert "not solved by RRTConnect and BatchEST" in shown
     assert "left to the goal: " in shown
     assert not (room / "shut.path").exists()
     assert rows_of(room / "shut.approach.path")[0].tolist() == [-2, 0, 0]

@@ -122,7 +122,7 @@ class OmplRun:
     def __init__(
         self, space: PlanningSpace, validity: Validity, planner: str, start: Array, goal: Array, seed: int
     ) -> None:
-        self.validity = validity
+        self.name, self.validity = planner, validity
         util.setLogLevel(util.LOG_NONE)
         # Zero is no seed for OMPL.
         util.RNG.setSeed(seed + 1)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..transforms import Array
+from .names import BATCH
 from .space import PlanningSpace
 from .validity import Validity
 
@@ -78,7 +79,7 @@ class ExpandingRun:
     """
 
     def __init__(self, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> None:
-        self.validity = validity
+        self.name, self.validity = BATCH, validity
         self._space, self._goal = space, goal
         self._rng = np.random.default_rng(seed)
         self._trees = (_Tree(start, space), _Tree(goal, space))
