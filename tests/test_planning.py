@@ -22,6 +22,7 @@ pytest.importorskip("ompl")
 
 from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
 from env2mjcf.planning.bridge import state_space
+from env2mjcf.planning.result import Progress
 from env2mjcf.planning.shortening import shortened
 from env2mjcf.planning.space import PlanningSpace
 from env2mjcf.planning.validity import Validity
@@ -261,6 +262,19 @@ def test_without_a_solution_the_best_approach_is_told(room: Path):
         assert -2 <= found.path[-1][0] <= -0.99
         assert found.left > 2.9
         assert_free_by_triangles(scene, found.path, 0.05)
+
+
+@pytest.mark.parametrize("planner", ["RRTConnect", "PRM", "KPIECE", "BatchEST"])
+def test_what_is_raised_while_planning_comes_out(planner: str, room: Path):
+    scene = env2mjcf.load(room / "shut.env", query=room / "cross.query")
+    start, goal = scene.queries[0].q
+
+    def interrupt(progress: Progress) -> None:
+        if progress.motions:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan(scene, start, goal, planner=planner, time=20, progress=interrupt)
 
 
 def test_thin_walls_are_not_passed_over(tmp_path: Path):
