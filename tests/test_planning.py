@@ -333,6 +333,15 @@ def test_what_cannot_be_planned_is_said(arguments: dict[str, Any], message: str,
 # The verb.
 
 
+def test_the_help_and_the_documentation_name_every_planner():
+    from env2mjcf.cli.plan import Plan as Verb
+
+    page = (MODELS.parent / "docs" / "planning.md").read_text(encoding="utf-8")
+    for name in PLANNERS:
+        assert re.search(rf"\b{name}\b", Verb.__doc__ or "")
+        assert f"`{name}`" in page
+
+
 def rows_of(path: Path) -> np.ndarray:
     """The configurations of a path file, read as its format says; of three numbers, behind the robot's index if any."""
     header, links, count, *rows = path.read_text().splitlines()
