@@ -133,7 +133,7 @@ def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path)
         "center": center.tolist(),
         "extent": max(_diagonal(points), 1e-9),
         "cameras": [{"position": v.position, "forward": v.forward} for v in views],
-        "robots": [geoms[name] for name in scene.link_names],
+        "watched": [geoms[name] for name in _watched(shot)],
         "obstacles": [geoms[p.name] for p in (*assembly.obstacles, *assembly.surfaces)],
         "hidden": hidden,
         "see_through": shot.see_through,
@@ -142,6 +142,12 @@ def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path)
         "marks": [mark.described() for mark in (*_boundary_marks(scene), *shot.marks)],
         "frames": [_frame(shot, frame, geoms) for frame in shot.frames],
     }
+
+
+def _watched(shot: Shot) -> list[str]:
+    """Return the links that the camera is to see: those that touch in a single picture, else all."""
+    touching = shot.frames[0].touching if len(shot.frames) == 1 else frozenset[str]()
+    return [n for n in shot.scene.link_names if n in touching] or list(shot.scene.link_names)
 
 
 def _frame(shot: Shot, frame: Frame, geoms: Mapping[str, int]) -> dict[str, Any]:
