@@ -8,7 +8,7 @@ import platform
 import time
 from pathlib import Path
 
-_PACKAGES = ("numpy", "numba", "mujoco", "coal", "python-fcl", "pin", "trimesh")
+_PACKAGES = ("numpy", "numba", "mujoco", "coal", "python-fcl", "pin", "trimesh", "ompl")
 
 
 def machine() -> str:

@@ -100,8 +100,14 @@ def on_docstring(app: Sphinx, what: str, name: str, obj: object, options: object
         lines.insert(0, "")
 
 
+def on_fields(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Keep docutils from taking the name of a type that ends in an underscore for a link."""
+    lines[:] = [re.sub(r"\bnp\.bool_(?=\W|$)", "bool", line) if ":vartype" in line else line for line in lines]
+
+
 def setup(app: Sphinx) -> None:
     """Connect these."""
     app.connect("source-read", on_source)
     app.connect("include-read", on_include)
     app.connect("autodoc-process-docstring", on_docstring, priority=400)
+    app.connect("autodoc-process-docstring", on_fields, priority=600)

@@ -16,7 +16,7 @@ from .simulation.scene import Scene
 from .simulation.verdicts import Judge, touch
 from .transforms import Array
 from .view.offscreen import RenderError
-from .view.picture import picture as draw
+from .view.pictures import picture as draw
 
 __all__ = ["assert_free", "assert_valid", "assert_valid_path"]
 
@@ -162,7 +162,7 @@ def _draw(scene: Scene, rows: Array, picture: str | PathLike[str] | None) -> str
         return ""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        draw(scene, rows[-1], file=target, ghosts=rows[:-1], contacts=True)
+        draw(scene, rows[-1], file=target, size=(1280, 960), ghosts=rows[:-1], contacts=True)
     except (RenderError, OSError) as error:
         return f"no picture: {error}"
     return f"picture: {target}"

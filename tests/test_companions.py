@@ -245,3 +245,69 @@ def test_an_empty_path_is_written_and_read(tmp_path: Path) -> None:
     found = env2mjcf.read_path(scene, env2mjcf.write_path(scene, np.zeros((0, 6)), tmp_path / "x.path"))
     assert found.q.shape == (0, 6)
     assert not found.diagnostics
+
+
+SLIPS = (
+    "nan",
+    "-1",
+    "1e999",
+    "1e101",
+    "1e99",
+    "1e18",
+    "9" * 400,
+    "x",
+    "0.5",
+    "#",
+    "//",
+    "0x1",
+    "1_0",
+    "٣",
+    "",
+    "0",
+    "7 7",
+)
+
+
+@pytest.mark.parametrize("kind", ["path", "poses", "map", "query"])
+def test_no_slip_of_the_pen_is_more_than_a_refusal(tmp_path: Path, kind: str) -> None:
+    """One word after the other is replaced by whatever may stand there by mistake, and every other line is doubled."""
+    scene = load(tmp_path, SCENES["A"] if kind == "poses" else SCENES["D"])
+    q = scene.space.sample(4, seed=0)
+    file = tmp_path / "x"
+    if kind == "poses":
+        file.write_text(recorded_poses(scene, q[:2]))
+    elif kind == "map":
+        env2mjcf.write_roadmap(
+            scene, Roadmap.of(q, [[0, 1], [0, 2], [2, 3]], intermediates=[q[:0], q[1:3], q[:1]]), file
+        )
+    elif kind == "query":
+        env2mjcf.write_query(scene, Query(0, q), file)
+    else:
+        env2mjcf.write_path(scene, q, file)
+    read = {"map": env2mjcf.read_roadmap, "query": env2mjcf.read_query}.get(kind, env2mjcf.read_path)
+    words = file.read_text().replace("\n", " \n ").split(" ")
+    places = [i for i, word in enumerate(words) if word.strip()]
+    slips = np.random.default_rng(0).permutation(len(places) * len(SLIPS))[:600]
+    for slip in slips.tolist():
+        changed = list(words)
+        changed[places[slip // len(SLIPS)]] = SLIPS[slip % len(SLIPS)]
+        file.write_text(" ".join(changed))
+        try:
+            found = read(scene, file)
+        except FormatError:
+            continue
+        for part in found if isinstance(found, tuple) else (found,):
+            assert np.isfinite(part.q).all()
+
+
+def test_files_of_the_time_of_turns_are_read_in_turns_whatever_the_scene_is_written_in(tmp_path: Path) -> None:
+    scene = load(tmp_path, SCENES["D"])
+    (tmp_path / "x.path").write_text("VIZMO_PATH_FILE   Path Version 20001125\n1\n1\n1 2 3 0 0 0.25\n")
+    found = env2mjcf.read_path(scene, tmp_path / "x.path")
+    np.testing.assert_allclose(found.q, [[1, 2, 3, 0, 0, np.pi / 2]])
+    assert [d.code for d in found.diagnostics] == ["CFG535"]
+    head = "Roadmap Version Number 061300\n#####GRAPHSTART#####\n1 0 1\n"
+    (tmp_path / "x.map").write_text(f"{head}0 1 2 3 0 0 0.25 -1 -1 -1 0\n#####GRAPHSTOP#####\n")
+    found_map = env2mjcf.read_roadmap(scene, tmp_path / "x.map")
+    np.testing.assert_allclose(found_map.q, [[1, 2, 3, 0, 0, np.pi / 2]])
+    assert [d.code for d in found_map.diagnostics] == ["CFG535"]

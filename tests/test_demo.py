@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 import pytest
 
-import env2mjcf
 from env2mjcf.view import offscreen
 
 ROOT = Path(__file__).parents[1]
@@ -43,12 +42,6 @@ def blue(picture: Path) -> int:
     """Count the pixels of the robot's colour; sky, ground and obstacles are grey, or nearly so."""
     image = pixels(picture)
     return int(np.count_nonzero(image[..., 2] - image[..., 0] > 60))
-
-
-@pytest.fixture(scope="module")
-def seed_xml(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seed scene as MJCF."""
-    return env2mjcf.convert(SEED, tmp_path_factory.mktemp("seed"), ground=True).xml
 
 
 def test_the_demo_reports_what_plain_mujoco_finds(tmp_path: Path) -> None:
@@ -95,45 +88,6 @@ def test_without_gl_the_demo_says_what_to_do_and_goes_on(tmp_path: Path) -> None
     assert list(tmp_path.rglob("*.png")) == []
 
 
-def test_a_machine_without_gl_is_told_what_to_install(
-    seed_xml: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # A backend that MuJoCo does not know fails in the child as a missing library does.
-    monkeypatch.setattr(offscreen, "_CANDIDATES", {"Linux": ("none",)})
-    monkeypatch.setattr(offscreen.platform, "system", lambda: "Linux")
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    offscreen._backend.cache_clear()
-    try:
-        assert offscreen.backend() is None
-        with pytest.raises(offscreen.RenderError, match="apt-get install libosmesa6"):
-            offscreen.render(seed_xml, tmp_path / "a.png")
-    finally:
-        offscreen._backend.cache_clear()
-
-
-@pytest.mark.parametrize("gl", ["egl", "osmesa"])
-def test_a_backend_that_is_named_is_tried_first(gl: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    tried: list[str] = []
-
-    def run(name: str, request: str) -> subprocess.CompletedProcess[str]:
-        assert request == "null"
-        tried.append(name)
-        return subprocess.CompletedProcess([], 0 if name == gl else 1)
-
-    monkeypatch.setattr(offscreen, "_run", run)
-    monkeypatch.setattr(offscreen.platform, "system", lambda: "Linux")
-    monkeypatch.setenv("MUJOCO_GL", gl)
-    offscreen._backend.cache_clear()
-    try:
-        assert offscreen.backend() == offscreen.backend() == gl
-        assert tried == [gl], "found once, by trying it first"
-        monkeypatch.delenv("MUJOCO_GL")
-        assert offscreen.backend() == gl
-        assert tried == {"egl": [gl, "egl"], "osmesa": [gl, "egl", "osmesa"]}[gl]
-    finally:
-        offscreen._backend.cache_clear()
-
-
 def test_importing_and_reading_touch_neither_gl_nor_mujoco() -> None:
     program = (
         "import sys, env2mjcf, env2mjcf.view.offscreen\n"
@@ -146,48 +100,6 @@ def test_importing_and_reading_touch_neither_gl_nor_mujoco() -> None:
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False
     )
     assert (finished.stdout.strip(), finished.stderr) == ("", "")
-
-
-@needs_gl
-def test_a_picture_leaves_this_process_without_gl(seed_xml: Path, tmp_path: Path) -> None:
-    program = (
-        "import sys\nfrom env2mjcf.view import offscreen\n"
-        f"offscreen.render({str(seed_xml)!r}, 'a.png', size=(64, 48))\n"
-        "print(*sorted({m.partition('.')[0] for m in sys.modules} & {'mujoco', 'OpenGL', 'glfw'}))\n"
-    )
-    finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert finished.stdout.strip() == ""
-    assert pixels(tmp_path / "a.png").shape == (48, 64, 3)
-
-
-@needs_gl
-def test_ghosts_and_zoom_show_more_of_the_robot(seed_xml: Path, tmp_path: Path) -> None:
-    home = mujoco.MjModel.from_xml_path(str(seed_xml)).key("home").qpos
-    aside = home + np.array([-0.8, *[0] * 9])
-    size = (320, 240)
-    alone = offscreen.render(seed_xml, tmp_path / "alone.png", home, size=size)
-    ghost = offscreen.render(seed_xml, tmp_path / "ghost.png", [aside, home], size=size)
-    near = offscreen.render(seed_xml, tmp_path / "near.png", "home", size=size, zoom=1.5)
-    assert blue(near) > 1.8 * blue(alone)
-    changed = np.abs(pixels(ghost) - pixels(alone)).max(axis=2) > 20
-    assert np.count_nonzero(changed) > 0.4 * blue(alone)
-
-
-@needs_gl
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"camera": "nowhere"}, "overview"),
-        ({"pose": "nowhere"}, "home"),
-        ({"pose": [0.0, 1.0]}, r"expected \(10,\)"),
-    ],
-)
-def test_an_impossible_picture_says_what_is_possible(
-    seed_xml: Path, tmp_path: Path, arguments: dict[str, object], message: str
-) -> None:
-    with pytest.raises(offscreen.RenderError, match=message):
-        offscreen.render(seed_xml, tmp_path / "a.png", **arguments)
-    assert not (tmp_path / "a.png").exists()
 
 
 def test_the_pictures_of_the_docs_are_small() -> None:

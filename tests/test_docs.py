@@ -42,6 +42,7 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     follow(page, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a checkout of git")
 def test_a_newcomer_gets_through_the_tutorial(tmp_path: Path) -> None:
     clone = tmp_path / "env2mjcf"

@@ -10,7 +10,10 @@ import pytest
 
 import env2mjcf
 from env2mjcf.errors import DiagnosticLog
+from env2mjcf.formats.path import read_path
+from env2mjcf.formats.source import read_source
 from env2mjcf.kinematics import RobotKinematics
+from env2mjcf.options import Limits
 from env2mjcf.transforms import rotation_matrix
 
 SEED_ROBOT = """1
@@ -102,8 +105,9 @@ def test_link_poses_that_the_planner_recorded_are_met(corpus: Path) -> None:
     robot = RobotKinematics.of(env2mjcf.read(folder / "2loop_13con.env").robots[0])
     assert robot.dim == 19
     cfg = np.loadtxt(folder / "prm.path.cfg")
-    lines = (folder / "prm.path").read_text().splitlines()
-    recorded = np.array([line.split() for line in lines[3 : 3 + 3600]], dtype=float).reshape(300, 12, 6)
+    recorded = read_path(read_source(folder / "prm.path", DiagnosticLog(), Limits()), [19], [12], DiagnosticLog()).poses
+    assert recorded is not None
+    assert recorded.shape == (300, 12, 6)
     poses = robot.forward(cfg * ([1] * 3 + [2 * math.pi] * 16))
     assert np.abs(poses[..., :3, 3] - recorded[..., :3]).max() < 6e-5
     angles = 2 * math.pi * recorded[..., 3:]

@@ -138,6 +138,7 @@ def test_numbers_may_run_over_lines() -> None:
         (f"{HEAD}2012\n1\n2\n", "CFG514", "declares 2 configurations, and none follows", 3),
         (f"{HEAD}2012\n1\n1\n1 2 3\n", "CFG504", "a row of 3 numbers", 4),
         (f"{HEAD}2012\n1\n1\n1 nan\n", "CFG502", "found 'nan'", 4),
+        (f"{HEAD}2012\n1\n1\n1 1e101\n", "CFG502", "found '1e101'", 4),
     ],
 )
 def test_bad_input_is_refused_where_it_stands(text: str, code: str, message: str, line: int) -> None:
@@ -161,7 +162,7 @@ def test_a_path_is_known_by_its_first_word() -> None:
 
 def test_what_is_written_has_the_header_that_the_newest_planner_compares_and_reads_back_exactly() -> None:
     rng = np.random.default_rng(3)
-    numbers = [*rng.normal(size=(20, 5)).tolist(), [0.1, -0.0, 1e-300, 5e-324, 1.7976931348623157e308]]
+    numbers = [*rng.normal(size=(20, 5)).tolist(), [0.1, -0.0, 1e-300, 5e-324, 1.7976931348623157e99]]
     for version, index in itertools.product((2012, TURNS), (None, 0)):
         text = path_text(numbers, version, index)
         assert text.splitlines()[:3] == [f"VIZMO_PATH_FILE   Path Version {version}", "1", "21"]

@@ -102,3 +102,13 @@ def test_the_python_examples_run(tmp_path: Path) -> None:
         [sys.executable, "-c", "\n".join(blocks)], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert finished.returncode == 0, finished.stderr
+
+
+def test_the_commands_from_a_clone_to_a_film_are_those_of_the_tutorial() -> None:
+    """The tutorial's commands are run by tests/test_docs.py."""
+    readme = README.read_text(encoding="utf-8")
+    commands = [line for line in readme.splitlines() if line.startswith("env2mjcf ") and "models/maze" in line]
+    assert [c.split()[1] for c in commands] == ["plan", "check", "play", "view"]
+    tutorial = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    for command in commands:
+        assert command in tutorial

@@ -89,6 +89,12 @@ def test_sliders_and_configurations_are_each_other_back(cube: Scene) -> None:
     assert dials.configuration([float("nan")] * 6) is None
 
 
+def test_an_angle_that_turns_without_end_stays_on_its_slider(cube: Scene) -> None:
+    dials = Dials(cube, NOTHING)
+    turned = np.array([0, 0, 0, 2 * np.pi, 3 * np.pi, -2.25 * np.pi])
+    np.testing.assert_allclose(dials.values(turned)[3:], [0, -1, -0.25], atol=1e-12)
+
+
 # Words.
 
 
@@ -159,7 +165,7 @@ def test_a_track_passes_its_configurations_at_a_constant_speed(cube: Scene) -> N
     corners = np.array([[0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [1, 3, 0, 0, 0, 0]], dtype=float)
     track = Track(cube, corners)
     assert track.length == pytest.approx(4.0)
-    places = track.rows(41)[:, :2]
+    places = np.array([track.at(x) for x in np.linspace(0, 1, 41)])[:, :2]
     np.testing.assert_allclose(np.abs(np.diff(places, axis=0)).sum(axis=1), 0.1, rtol=1e-9)
     np.testing.assert_allclose(places[[0, 10, 40]], corners[:, :2], atol=1e-12)
     assert [track.index(f) for f in (0.0, 0.2, 0.25, 0.9, 1.0)] == [0, 0, 1, 1, 2]

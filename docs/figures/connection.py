@@ -133,15 +133,19 @@ def standard() -> list[str]:
     return draw.lines
 
 
+def marker(name: str, colour: str) -> str:
+    """Return the head of an arrow; those of axes grow with the line."""
+    size, units = (5, "strokeWidth") if name in "xyz" else (8, "userSpaceOnUse")
+    return (
+        f'<marker id="{name}" viewBox="0 0 10 10" refX="7" refY="5" markerWidth="{size}" markerHeight="{size}" '
+        f'orient="auto" markerUnits="{units}"><path d="M0 0 L10 5 L0 10 z" fill="{colour}"/></marker>'
+    )
+
+
 def picture() -> str:
     """Return the SVG."""
     colours = (*AXES, ("way", "#444"), ("angle", "#7c3aed"))
-    markers = "".join(
-        f'<marker id="{name}" viewBox="0 0 10 10" refX="7" refY="5" markerWidth="{5 if name in "xyz" else 8}" '
-        f'markerHeight="{5 if name in "xyz" else 8}" orient="auto" markerUnits="{"strokeWidth" if name in "xyz" else "userSpaceOnUse"}">'
-        f'<path d="M0 0 L10 5 L0 10 z" fill="{colour}"/></marker>'
-        for name, colour in colours
-    )
+    markers = "".join(marker(name, colour) for name, colour in colours)
     style = """
 text { font-family: Helvetica, Arial, sans-serif; font-size: 14px; fill: #222 }
 .axis { font-size: 13px; font-weight: bold } .name { font-weight: bold } .step { font-size: 17px; font-weight: bold }
@@ -151,16 +155,19 @@ text { font-family: Helvetica, Arial, sans-serif; font-size: 14px; fill: #222 }
 """
     titles = [
         '<text x="40" y="272" class="title">T_DH in dialects A to D (Craig)</text>',
-        '<text x="40" y="294" class="small">Rx(alpha) Tx(a) Rz(theta) Tz(d): the joint turns about the z axis of frame 2</text>',
+        '<text x="40" y="294" class="small">Rx(alpha) Tx(a) Rz(theta) Tz(d): '
+        "the joint turns about the z axis of frame 2</text>",
         '<text x="530" y="272" class="title">T_DH in dialect E (standard)</text>',
-        '<text x="530" y="294" class="small">Rz(theta) Tz(d) Tx(a) Rx(alpha): the joint turns about the z axis of frame 1</text>',
+        '<text x="530" y="294" class="small">Rz(theta) Tz(d) Tx(a) Rx(alpha): '
+        "the joint turns about the z axis of frame 1</text>",
         '<line x1="20" y1="242" x2="980" y2="242" stroke="#d0d5da"/>',
         '<line x1="505" y1="258" x2="505" y2="530" stroke="#d0d5da"/>',
     ]
     lines = [*chain(), *titles, *craig(), *standard()]
     return "\n".join(
         [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">',
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
+            f'width="{WIDTH}" height="{HEIGHT}" role="img">',
             "<title>One connection: from the frame of the previous body to the frame of the next</title>",
             f"<style>{style}</style>",
             f"<defs>{markers}</defs>",

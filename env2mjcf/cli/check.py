@@ -64,6 +64,8 @@ class Check:
         resolution: Greatest distance in metres that any point of a robot moves between two checks of an edge; the
             file's PositionRes by default, else 0.01 of the scene's extent.
         certified: Prove, too, that nothing touches between the checks of an edge.
+        picture: Draw a PNG file, too: configurations as dots and edges as lines, red where they are invalid, and the
+            robot where the first one is.
         output: How to report.
         options: What may be chosen.
     """
@@ -74,6 +76,7 @@ class Check:
     all: bool = False
     resolution: float | None = None
     certified: bool = False
+    picture: Annotated[str | None, tyro.conf.arg(metavar="PICTURE.png")] = None
     output: OutputFlags = field(default_factory=Output)
     options: OptionFlags = field(default_factory=Options)
 
@@ -81,7 +84,10 @@ class Check:
         """Print a verdict on each configuration; 1 if any is invalid."""
         from ..simulation.preparing import load
         from ..simulation.verdicts import Judge
+        from .graph_picture import draw
 
+        if self.picture is not None and not self.picture.lower().endswith(".png"):
+            raise ValueError(f"--picture is {self.picture}; expected a file that ends in .png")
         if self.configurations and self.options.query is not None:
             raise ValueError("configurations are given twice: behind the scene and with --query")
         options = dataclasses.replace(self.options, query=None)
@@ -97,6 +103,9 @@ class Check:
         )
         edges = self._edges(scene, rows.graph)
         valid = bool(judge.valid.all()) and (edges is None or bool(edges.valid.all()))
+        if self.picture is not None:
+            with working("drawing"):
+                draw(scene, rows, judge, edges, self.picture)
         if self.output.json:
             print_json({"valid": valid, "dofs": scene.space.names, **as_json(judge, rows.graph, edges)})
         else:

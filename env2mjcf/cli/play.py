@@ -22,7 +22,7 @@ from .printing import one_line, print_diagnostics, print_json, print_parts, work
 
 if TYPE_CHECKING:
     from ..contact.types import Contact
-    from ..view.film import Film
+    from ..view.films import Film
 
 # Stretches of contact that are listed.
 _LISTED = 20
@@ -72,7 +72,7 @@ class Play:
     def run(self) -> int:
         """Write the film, and say what touches in it."""
         from ..simulation.preparing import load
-        from ..view.film import film
+        from ..view.films import film
         from .configurations import of_file
 
         camera, size = camera_of(self.camera), size_of(self.size)

@@ -64,7 +64,7 @@ class Render:
     def run(self) -> int:
         """Draw, and say where the picture is."""
         from ..simulation.preparing import load
-        from ..view.picture import picture
+        from ..view.pictures import picture
 
         if not self.out.lower().endswith(".png"):
             raise ValueError(f"--out is {self.out}; expected a file that ends in .png")
@@ -85,8 +85,8 @@ class Render:
         if self.output.json:
             print_json({"picture": self.out, "size": size, "touching": touching, "diagnostics": tuple(log)})
         else:
-            print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold")])
-            print_parts(Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching)
+            lines = [Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching]
+            print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold"), *lines])
         return 0
 
     def _rows(self, scene: Scene) -> Array:

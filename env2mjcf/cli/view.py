@@ -37,7 +37,7 @@ class View:
 
     Attributes:
         scene: An env file, an XML environment or a problem XML.
-        path: A path to be played: a .path file, or rows of numbers as `check` reads them.
+        path: A path to be played: a .path file, or a .csv or .npy file of rows in the file's own units.
         port: Where the page is served; a free port from 8080 on if it is not given.
         browser: Open the page in a browser.
         native: Open MuJoCo's own viewer instead of the page.
@@ -80,9 +80,11 @@ class View:
         from ..view.playback import doubts
         from .configurations import of_file
 
-        q = of_file(scene, str(self.path), False, self.options.limits, log).q
-        doubts(scene, q, str(self.path), log)
-        return q
+        found = of_file(scene, str(self.path), False, self.options.limits, log)
+        if found.graph is not None and found.graph.kind != "path":
+            raise ValueError(f"{self.path} is a {found.graph.kind}; --path plays paths")
+        doubts(scene, found.q, str(self.path), log)
+        return found.q
 
     def _serve(self, scene: Scene, path: Array | None) -> int:
         from ..view import web_server

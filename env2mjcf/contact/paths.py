@@ -15,6 +15,7 @@ from .types import Contact, PathReport
 
 # Without a resolution in the file, a step is this fraction of the extent.
 _DEFAULT_RESOLUTION = 0.01
+_MOST_STEPS = 1e15
 
 
 class EdgeSteps:
@@ -46,7 +47,9 @@ class EdgeSteps:
     def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
         """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""
         moved = self._motion.links(start, delta).max(axis=1, initial=0.0)
-        return np.maximum(2, np.ceil(moved / self.resolution(resolution)).astype(np.int64) + 1)
+        # What fits into no integer would come out negative, and pass for a short way.
+        steps = np.minimum(np.ceil(moved / self.resolution(resolution)), _MOST_STEPS)
+        return np.maximum(2, steps.astype(np.int64) + 1)
 
     def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:
         """Return the configurations to be checked on an edge, both ends included, (n, dim)."""

@@ -9,11 +9,13 @@ from enum import StrEnum
 from typing import NoReturn
 
 from ..errors import DiagnosticLog, FormatError
-from .lexer import number_hint, parse_number
+from .rows import coordinate, coordinate_hint
 from .source import Source
 
 _WORD = re.compile(r"\S+")
 _MODERN_INFO = 3
+# Beyond this, doubles are no longer every whole number.
+_LARGEST_ID = 2**53
 
 
 class EdgeForm(StrEnum):
@@ -250,7 +252,7 @@ class _Reading:
     def _number(self, expected: str) -> float:
         if self._at >= len(self._words):
             raise _Misfit(self._at, expected)
-        value = parse_number(self._words[self._at].text)
+        value = coordinate(self._words[self._at].text)
         if value is None:
             raise _Misfit(self._at, expected)
         self._at += 1
@@ -258,7 +260,7 @@ class _Reading:
 
     def _whole(self, expected: str, least: int = 0) -> int:
         value = self._number(expected)
-        if not value.is_integer() or value < least:
+        if not value.is_integer() or not least <= value <= _LARGEST_ID:
             raise _Misfit(self._at - 1, expected)
         return int(value)
 
@@ -277,6 +279,6 @@ def _fail(
     log.fail(
         FormatError, "CFG529", source.path,
         f"expected {misfit.expected}, found {word.text[:60]!r}; robots have so many degrees of freedom: {expected}",
-        hint=number_hint(word.text) or "is it the roadmap of another scene?",
+        hint=coordinate_hint(word.text) or "is it the roadmap of another scene?",
         span=source.span(word.start, word.start + len(word.text)),
     )  # fmt: skip

@@ -15,6 +15,8 @@ _WORD = re.compile(r"\S+")
 _COMMENT = re.compile(r"#|//")
 # Dialect A's InfoCfg wrote three numbers behind some configurations.
 _LEGACY_INFO_FIELDS = 3
+# Larger numbers overflow as soon as they are squared.
+_LARGEST = 1e100
 
 
 class Extra(StrEnum):
@@ -48,6 +50,18 @@ class Line:
 
     numbers: tuple[float, ...]
     span: Span
+
+
+def coordinate(word: str) -> float | None:
+    """Return the number that a word is; None where it is none, or no length or angle that can be computed with."""
+    value = parse_number(word)
+    return value if value is not None and abs(value) <= _LARGEST else None
+
+
+def coordinate_hint(word: str) -> str:
+    """Return what to do about a word that is no coordinate; empty where it does not look like a number."""
+    too_large = parse_number(word) is not None and coordinate(word) is None
+    return f"numbers must not be larger than {_LARGEST:g}" if too_large else number_hint(word)
 
 
 def split_row(numbers: Sequence[float], dofs: Sequence[int]) -> tuple[int, tuple[float, ...]] | None:
@@ -85,17 +99,18 @@ def number_lines(source: Source, log: DiagnosticLog, start: int = 0) -> list[Lin
     for begin, text in source.lines():
         skipped = max(0, min(start - begin, len(text)))
         numbers: list[float] = []
-        span = source.span(begin)
+        first = begin, begin
         for match in _WORD.finditer(_COMMENT.split(text, maxsplit=1)[0], skipped):
-            place = source.span(begin + match.start(), begin + match.end())
-            value = parse_number(match.group())
+            value = coordinate(match.group())
             if value is None:
+                place = source.span(begin + match.start(), begin + match.end())
                 _end_list(source, match.group(), place, log, empty=not lines and not numbers)
-                return [*lines, Line(tuple(numbers), span)] if numbers else lines
-            span = span if numbers else place
+                return [*lines, Line(tuple(numbers), source.span(*first))] if numbers else lines
+            if not numbers:
+                first = begin + match.start(), begin + match.end()
             numbers.append(value)
         if numbers:
-            lines.append(Line(tuple(numbers), span))
+            lines.append(Line(tuple(numbers), source.span(*first)))
     return lines
 
 
@@ -108,7 +123,7 @@ def _extra(width: int, dof: int, *, legacy: bool) -> Extra | None:
 
 def _end_list(source: Source, word: str, place: Span, log: DiagnosticLog, *, empty: bool) -> None:
     # What looks like a number is one that went wrong, not text behind the list.
-    hint = number_hint(word)
+    hint = coordinate_hint(word)
     if empty or hint or word[0] in "+-.0123456789":
         log.fail(
             FormatError, "CFG502", source.path, f"expected a number, found {word[:60]!r}",

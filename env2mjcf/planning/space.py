@@ -58,11 +58,13 @@ class PlanningSpace:
         lower, upper: (d,) finite limits of what is drawn.
         turns: (d,) which are circles.
         weights: (d,) of the distance.
+        extent: Of the scene, in metres.
     """
 
     def __init__(self, scene: Scene, rows: Array, columns: NDArray[np.int64]) -> None:
         space = scene.space
         self.columns = columns
+        self.extent = scene.extent
         self.names = tuple(space.names[c] for c in columns)
         self.turns: NDArray[np.bool_] = space.periodic[columns]
         lower, upper = space.sample_limits
@@ -119,6 +121,11 @@ class PlanningSpace:
     def path_length(self, values: Array) -> float:
         """Return the length of a path, (k, d)."""
         return float(self.lengths(self.difference(values[:-1], values[1:])).sum())
+
+    def enforced(self, values: Array) -> Array:
+        """Return configurations, (n, d), within the limits, angles of circles from -pi to pi."""
+        reduced = values - self._whole_turns * np.floor(values / (2 * np.pi) + 0.5)
+        return np.clip(reduced, self.lower, self.upper)
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
         """Draw configurations uniformly, (n, d)."""

@@ -162,8 +162,7 @@ class EdgeJudge:
     def _walk(self, start: Array, delta: Array, owner: Indices) -> None:
         """Check all edges at even steps, and note the first check of each that fails."""
         counts = self._steps.counts(start, delta, self.resolution)
-        # A count that does not fit into its type has come out negative.
-        if counts.sum(dtype=np.float64) > _MOST_CHECKS or (counts < 2).any():
+        if counts.sum(dtype=np.float64) > _MOST_CHECKS:
             raise ValueError(f"resolution is {self.resolution}; in such steps the edges would take too many checks")
         stops = np.cumsum(counts)
         whole = np.bincount(owner, counts, minlength=len(self.valid))

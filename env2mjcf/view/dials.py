@@ -65,8 +65,15 @@ class Dials:
         )
 
     def values(self, q: Array) -> list[float]:
-        """Return the file's numbers of a configuration, (dim,)."""
-        return self._space.encode(q).tolist()
+        """Return the file's numbers of a configuration, (dim,).
+
+        Angles that turn without end, and go on steadily along a path, are reduced by whole turns to what a slider has.
+        """
+        numbers = self._space.encode(q)
+        turn = self._space.encode(np.full(self._space.dim, 2 * np.pi))
+        outside = (numbers < self._low - self._steps) | (numbers > self._high + self._steps)
+        reduced = self._low + np.mod(numbers - self._low, turn)
+        return np.where(self._space.periodic & outside, reduced, numbers).tolist()
 
     def configuration(self, values: list[float]) -> Array | None:
         """Return the configuration that sliders stand for, (dim,); None where a number is not finite.

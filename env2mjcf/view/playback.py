@@ -8,22 +8,24 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..contact.motion import MotionBounds
 from ..errors import DiagnosticLog, FormatError
 from ..simulation.scene import Scene
 from ..transforms import Array
+from .trails import fine, lengths
 
 # Playing through takes as long as it takes to cross the scene so often, and no less or more than these.
 _SECONDS_PER_EXTENT = 5.0
 _LEAST_SECONDS, _MOST_SECONDS = 3.0, 60.0
 _TICK = 1 / 30
+# An edge is cut so finely to be measured.
+_PARTS = 16
 
 
 class Track:
     """A path that can be asked for any place between its ends.
 
-    The way between two configurations is straight, the short way round on periodic degrees of freedom. Its length is a
-    bound of how far any point of a robot moves: equal parts of the track look equally long.
+    The way between two configurations is straight, the short way round on periodic degrees of freedom. Equal parts of
+    the track are equally long for the corner that moves furthest (see `trails.lengths`).
 
     Args:
         scene: The scene.
@@ -31,40 +33,35 @@ class Track:
     """
 
     def __init__(self, scene: Scene, q: Array) -> None:
-        rows = scene.space.check(q)
-        assembly = scene.compiled.assembly
-        self.q = rows
-        self._delta = scene.space.difference(rows[:-1], rows[1:])
-        moved = MotionBounds(assembly, scene.space).links(rows[:-1], self._delta)
-        lengths = moved.max(axis=1, initial=0.0)
-        self._at = np.concatenate([[0.0], np.cumsum(lengths)])
-        wished = _SECONDS_PER_EXTENT * self.length / assembly.extent
+        self.q = scene.space.check(q)
+        self._rows = fine(scene, self.q, _PARTS)
+        self._far = lengths(scene, self._rows)
+        # Where nothing moves, time stands still.
+        self._keep = np.concatenate([[True], np.diff(self._far) > 0])
+        wished = _SECONDS_PER_EXTENT * self.length / scene.extent
         self.seconds = float(np.clip(wished, _LEAST_SECONDS, _MOST_SECONDS))
 
     @property
     def length(self) -> float:
-        """Metres, by the bound of motion."""
-        return float(self._at[-1])
+        """Metres."""
+        return float(self._far[-1])
 
     def at(self, fraction: float) -> Array:
-        """Return the configuration at a fraction of the length, (dim,)."""
-        if self.length == 0:
+        """Return the configuration at a fraction of the length, (dim,); at both ends exactly the path's own."""
+        if fraction <= 0 or self.length == 0:
             return self.q[0].copy()
-        place = float(np.clip(fraction, 0.0, 1.0)) * self.length
-        i = self.index(fraction)
-        if i == len(self._delta):
+        if fraction >= 1:
             return self.q[-1].copy()
-        part = (place - self._at[i]) / (self._at[i + 1] - self._at[i])
-        return self.q[i] + part * self._delta[i]
+        place, far = fraction * self.length, self._far[self._keep]
+        return np.array([np.interp(place, far, column) for column in self._rows[self._keep].T])
 
     def index(self, fraction: float) -> int:
         """Return which configuration was the last one passed at a fraction of the length."""
-        place = float(np.clip(fraction, 0.0, 1.0)) * self.length
-        return min(int(np.searchsorted(self._at, place, side="right")) - 1, len(self.q) - 1)
-
-    def rows(self, n: int) -> Array:
-        """Return n configurations evenly along the track, both ends included, (n, dim)."""
-        return np.array([self.at(x) for x in np.linspace(0.0, 1.0, n)])
+        if fraction >= 1:
+            return len(self.q) - 1
+        # Places that are sums of many parts are a rounding error before where they should be.
+        place = fraction * self.length * (1 + 1e-12)
+        return (int(np.searchsorted(self._far, place, side="right")) - 1) // _PARTS
 
 
 def doubts(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:

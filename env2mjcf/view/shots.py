@@ -27,6 +27,7 @@ _FAR_BOUNDARY = 2.0
 # Up to so many configurations are framed by all their vertices, more of them by the boxes of their links.
 _FEW = 4
 _TINT = 0.65
+LARGEST = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,11 +93,14 @@ def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
         What was chosen, and the stream that the pictures come out of; see `worker`.
 
     Raises:
-        ValueError: The camera has an unknown name, or a size is not positive.
+        ValueError: The camera has an unknown name, or the size is out of range.
         RenderError: It cannot be drawn here.
     """
-    if min(shot.size) < 1:
-        raise ValueError(f"a picture of {shot.size[0]} x {shot.size[1]} pixels; expected at least 1 x 1")
+    if not 1 <= min(shot.size) <= max(shot.size) <= LARGEST:
+        raise ValueError(
+            f"a picture of {shot.size[0]} x {shot.size[1]} pixels; "
+            f"expected at least 1 x 1 and at most {LARGEST} x {LARGEST}"
+        )
     points = _in_view(shot)
     views = _views(shot, points)
     with tempfile.TemporaryDirectory(prefix="env2mjcf-") as folder:
@@ -129,7 +133,7 @@ def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path)
         "center": center.tolist(),
         "extent": max(_diagonal(points), 1e-9),
         "cameras": [{"position": v.position, "forward": v.forward} for v in views],
-        "robots": [geoms[name] for name in scene.link_names],
+        "watched": [geoms[name] for name in _watched(shot)],
         "obstacles": [geoms[p.name] for p in (*assembly.obstacles, *assembly.surfaces)],
         "hidden": hidden,
         "see_through": shot.see_through,
@@ -138,6 +142,12 @@ def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path)
         "marks": [mark.described() for mark in (*_boundary_marks(scene), *shot.marks)],
         "frames": [_frame(shot, frame, geoms) for frame in shot.frames],
     }
+
+
+def _watched(shot: Shot) -> list[str]:
+    """Return the links that the camera is to see: those that touch in a single picture, else all."""
+    touching = shot.frames[0].touching if len(shot.frames) == 1 else frozenset[str]()
+    return [n for n in shot.scene.link_names if n in touching] or list(shot.scene.link_names)
 
 
 def _frame(shot: Shot, frame: Frame, geoms: Mapping[str, int]) -> dict[str, Any]:

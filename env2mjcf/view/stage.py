@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..geometry.assembly import Assembly
 from ..mjcf.boundary import boundary_lines
-from ..mjcf.scenery import OVERVIEW
 from ..simulation.scene import Scene
 from ..transforms import Array
+from .framing import FIELD_OF_VIEW, fitted, named_direction
 
 if TYPE_CHECKING:
     import viser
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
 _WIRE = (120, 128, 138)
 # Above and below.
 _BACKGROUND = ((244, 246, 248), (216, 224, 232))
-_FIELD_OF_VIEW = math.radians(40)
-# Room around what is seen.
-_AROUND = 1.06
 # A boundary is seen whole if it is no more than so many times as large as all bodies.
 _BOUNDARY_SEEN = 1.5
 
@@ -60,13 +56,14 @@ def _add_lights(server: viser.ViserServer) -> None:
 
 
 def _place_camera(server: viser.ViserServer, lower: Array, upper: Array) -> None:
-    """Look from where the MJCF's `overview` stands, as near as a whole box is seen."""
-    center, back = (lower + upper) / 2, np.array(OVERVIEW) / np.linalg.norm(OVERVIEW)
-    distance = _distance(lower - center, upper - center, back)
+    """Look from where the MJCF's `overview` stands, as near as a whole box is seen in a square picture."""
+    view = fitted(_corners(lower, upper), named_direction("overview"), 1.0)
+    position, forward = np.array(view.position), np.array(view.forward)
+    distance = float(((lower + upper) / 2 - position) @ forward)
     camera = server.initial_camera
-    camera.fov = _FIELD_OF_VIEW
+    camera.fov = FIELD_OF_VIEW
     camera.near, camera.far = distance / 1000, distance * 100
-    camera.position, camera.look_at, camera.up = center + distance * back, center, (0.0, 0.0, 1.0)
+    camera.position, camera.look_at, camera.up = position, position + distance * forward, (0.0, 0.0, 1.0)
 
 
 def _add_ground(server: viser.ViserServer, assembly: Assembly) -> None:
@@ -94,15 +91,6 @@ def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
         if np.linalg.norm(high - low) <= _BOUNDARY_SEEN * np.linalg.norm(upper - lower):
             return low, high
     return lower, upper
-
-
-def _distance(lower: Array, upper: Array, back: Array) -> float:
-    """Return from how far a square picture holds a box about the origin, seen from the direction `back`."""
-    right = np.cross((0.0, 0.0, 1.0), back)
-    right /= np.linalg.norm(right)
-    corners = _corners(lower, upper)
-    aside = np.abs(corners @ np.stack([right, np.cross(back, right)], axis=1)).max(axis=1)
-    return _AROUND * float(np.max(aside / math.tan(_FIELD_OF_VIEW / 2) + corners @ back))
 
 
 def _corners(lower: Array, upper: Array) -> Array:

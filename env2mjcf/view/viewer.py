@@ -15,6 +15,7 @@ from .judging import LiveJudge, Newest
 from .page import Page
 from .playback import Player, Track
 from .stage import set_stage
+from .trails import paced, reference_points
 from .web_scene import WebScene
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class Viewer:
         self.page = Page(server, self._dials, scene, self._track, self, hidden)
         if self._track is not None:
             self._player = Player(self._track.seconds, self._tick, self.page.paused)
-            self._web.trail(_trail(scene, self._track))
+            self._web.trail(reference_points(scene, paced(scene, self._track.q, _TRAIL_POINTS)[0]))
         self._newest = Newest[Array](self._judge_shown)
         self.q = scene.space.home.copy()
         self.show(first)
@@ -172,18 +173,3 @@ def _is_enclosed(scene: Scene, q: Array) -> bool:
         world = part.mesh.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
         boxes.append((world.min(axis=0), world.max(axis=0)))
     return len(places) > 0 and any(bool(np.all((places > low) & (places < high))) for low, high in boxes)
-
-
-def _trail(scene: Scene, track: Track) -> list[Array]:
-    """Return the ways of the middle of each robot's last link that moves, each (n, 3)."""
-    rows = track.rows(_TRAIL_POINTS)
-    poses = scene.link_poses(rows)
-    ways: list[Array] = []
-    first = 0
-    for robot in scene.compiled.assembly.robots:
-        middle = [p.mesh.vertices[np.unique(p.mesh.faces)].mean(axis=0) for p in robot.links]
-        every = [poses[:, first + i] @ np.append(m, 1.0) for i, m in enumerate(middle)]
-        moving = [way[:, :3] for way in every if np.ptp(way, axis=0).max() > 0]
-        ways += moving[-1:]
-        first += len(robot.links)
-    return ways

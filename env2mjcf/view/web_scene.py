@@ -81,6 +81,8 @@ class WebScene:
     def trail(self, lines: Iterable[Array]) -> None:
         """Draw ways of points, each (n, 3)."""
         for i, points in enumerate(lines):
+            if not np.ptp(points, axis=0).any():
+                continue
             segments = np.stack([points[:-1], points[1:]], axis=1)
             self._server.scene.add_line_segments(
                 f"/trail/{i}", segments, _TRAIL, thickness=2.5, thickness_units="screen"

@@ -25,7 +25,7 @@ _GHOST_OPACITY = 0.22
 _SEEN_THROUGH_OPACITY = 0.25
 # Enough pixels to tell how much of a robot can be seen.
 _PROBE_HEIGHT = 120
-# A camera that sees this share of the robots is good; where none sees the second, obstacles are drawn transparent.
+# A camera that sees this share of the links is good; where none sees the second, obstacles are drawn transparent.
 _GOOD_SHARE, _POOR_SHARE = 0.7, 0.4
 _HIDDEN_GROUP = 5
 
@@ -96,9 +96,9 @@ class Artist:
             yield _reduced(renderer.render(), scale)
 
     def _best_camera(self) -> tuple[int, float]:
-        """Return the first camera that sees the robots well, else the best one, and the share of them that it sees."""
-        robots, count = self._request["robots"], len(self._request["cameras"])
-        if not robots or (count == 1 and self._request["see_through"] is not None):
+        """Return the first camera that sees the links well, else the best one, and the share of them that it sees."""
+        watched, count = self._request["watched"], len(self._request["cameras"])
+        if not watched or (count == 1 and self._request["see_through"] is not None):
             return 0, 1.0
         renderer = self._renderer(max(1, _PROBE_HEIGHT * self._width // self._height), _PROBE_HEIGHT)
         renderer.enable_segmentation_rendering()
@@ -115,14 +115,14 @@ class Artist:
         return best, best_share
 
     def _share(self, renderer: Any, data: mujoco.MjData, number: int) -> float:
-        """Return the share of the robots' pixels that obstacles do not hide; 1 for robots without pixels."""
-        model, robots = self._model, self._request["robots"]
+        """Return the share of the links' pixels that obstacles do not hide; 1 for links without pixels."""
+        model, watched = self._model, self._request["watched"]
         counts: list[int] = []
         groups = model.geom_group.copy()
         for hidden in ([], self._request["obstacles"]):
             model.geom_group[hidden] = _HIDDEN_GROUP
             renderer.update_scene(data, self._camera(number), self._option)
-            counts.append(int(np.isin(_geoms(renderer.render()), robots).sum()))
+            counts.append(int(np.isin(_geoms(renderer.render()), watched).sum()))
         model.geom_group[:] = groups
         return counts[0] / counts[1] if counts[1] else 1.0
 

@@ -19,7 +19,7 @@ from .encoding import encoder
 from .framing import Camera, Viewpoint
 from .marks import TRAIL, Polyline
 from .offscreen import read_exactly
-from .picture import touched, trail_marks
+from .pictures import touched, trail_marks
 from .shots import Frame, Shot, taken
 from .trails import paced, reference_points
 
