@@ -60,7 +60,8 @@ def executed(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     # The interpreter that runs the tests, whatever kernels are installed for the user.
     manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[]))
     notebook = read(file)
-    NotebookClient(notebook, km=manager, timeout=SECONDS, resources={"metadata": {"path": str(folder)}}).execute()
+    client = NotebookClient(notebook, km=manager, timeout=SECONDS, resources={"metadata": {"path": str(folder)}})
+    client.execute(cleanup_kc=True)  # a kernel that the client has not made itself is otherwise left running
     return notebook
 
 
