@@ -59,7 +59,7 @@ def install(clone: Path) -> None:
         if (source := Path(sys.prefix) / part).exists():
             (venv / part).symlink_to(source)
     # Newer than pyproject.toml, so that nothing is installed anew.
-    (venv / "view.stamp").touch()
+    (venv / "demo.stamp").touch()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
