@@ -51,7 +51,7 @@ def fine(scene: Scene, path: ArrayLike, parts: int = _PARTS_OF_AN_EDGE) -> Array
     steps = scene.space.difference(rows[:-1], rows[1:])
     unwound = rows[0] + np.concatenate([np.zeros((1, scene.space.dim)), np.cumsum(steps, axis=0)])
     at = np.arange((len(rows) - 1) * parts + 1) / parts
-    knots = np.arange(len(rows))
+    knots = np.arange(len(rows), dtype=np.float64)
     return _interpolated(at, knots, unwound)
 
 
