@@ -2,5 +2,7 @@
 
 from __future__ import annotations
 
+from .files import Written as Written
+from .files import write_environment as write_environment
 from .translating import Translation as Translation
 from .translating import translate as translate

@@ -51,7 +51,7 @@ def _dressed(body: Body, losses: Losses) -> Body:
         )  # fmt: skip
     if body.mass is not None and not losses.vocabulary.mass:
         losses.lost(
-            "ENV171", name, f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost", "", span
+            "ENV170", name, f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost", "", span
         )
         body = replace(body, mass=None)
     if losses.vocabulary.options:

@@ -72,7 +72,7 @@ def _wide(environment: Environment, losses: Losses) -> Boundary:
     losses.lost(
         "ENV161", "Boundary", f"dialect {losses.dialect} must have a boundary; written as a box from {-half:g} "
         f"to {half:g}",
-        "write the boundary that is meant",
+        "give the boundary that is meant: boundary=Boundary(...) (--box X0 X1 Y0 Y1 Z0 Z1)",
     )  # fmt: skip
     return Boundary(BoundaryShape.BOX, (-half,) * 3, (half,) * 3)
 

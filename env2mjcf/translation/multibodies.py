@@ -34,7 +34,7 @@ def robot(source: MultiBody, meets_obstacles: bool, losses: Losses) -> MultiBody
     if source.adjacencies and not losses.vocabulary.adjacencies:
         losses.lost(
             "ENV172", "Adjacencies", f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
-            "are lost, so that such links are tested against each other", "exclude them with exclude_pairs", source.span,
+            "are lost, so that those links are tested", "exclude them with exclude_pairs", source.span,
         )  # fmt: skip
     if source.actuators:
         losses.lost("ENV177", "<Actuator>", "text files have no actuators; they are lost", "", source.actuators[0].span)

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ..dialects import RULES
 from ..dofs import Dof, DofKind
-from ..formats.writers.decimals import decimal
 from ..kinematics import RobotKinematics
 from ..model import MultiBody, Task
 from ..transforms import Array, wrap
@@ -53,14 +52,17 @@ class DofMap:
     def numbers(self, configuration: Sequence[float]) -> tuple[float, ...]:
         """Turn one configuration from the source's own numbers into the target's."""
         before, after = (RULES[k.multibody.dialect].configuration_angle for k in (self.source, self.target))
-        units = [1.0 if d.kind.is_length else before for d in self.source.dofs]
-        q = self.q(np.array(configuration, dtype=np.float64) * units)
-        if before == after and np.array_equal(q, (np.array(configuration) * units)[list(self.order)]):
-            return tuple(configuration[i] for i in self.order)
-        return tuple(
-            float(decimal(float(x), 1.0 if d.kind.is_length else after))
-            for x, d in zip(q, self.target.dofs, strict=True)
-        )
+        ratio, half_turn = before / after, np.pi / after
+        found: list[float] = []
+        for dof, old in zip(self.target.dofs, self.order, strict=True):
+            value = float(configuration[old])
+            if not dof.kind.is_length:
+                value *= ratio
+                # Turns go from 0 to 1, and pi units from -1 to 1 (env-format section 9.5).
+                if ratio > 1 and self.source.dofs[old].periodic:
+                    value -= 2 * half_turn * np.floor(value / (2 * half_turn) + 0.5)
+            found.append(float(value))
+        return tuple(found)
 
     def task(self, task: Task) -> Task:
         """Turn a task's configurations into the target's numbers."""
