@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -52,7 +53,7 @@ class DofMap:
     def numbers(self, configuration: Sequence[float]) -> tuple[float, ...]:
         """Turn one configuration from the source's own numbers into the target's."""
         before, after = (RULES[k.multibody.dialect].configuration_angle for k in (self.source, self.target))
-        ratio, half_turn = before / after, np.pi / after
+        ratio, half_turn = before / after, math.pi / after
         found: list[float] = []
         for dof, old in zip(self.target.dofs, self.order, strict=True):
             value = float(configuration[old])
@@ -60,8 +61,11 @@ class DofMap:
                 value *= ratio
                 # Turns go from 0 to 1, and pi units from -1 to 1 (env-format section 9.5).
                 if ratio > 1 and self.source.dofs[old].periodic:
-                    value -= 2 * half_turn * np.floor(value / (2 * half_turn) + 0.5)
-            found.append(float(value))
+                    value -= 2 * half_turn * math.floor(value / (2 * half_turn) + 0.5)
+                    # 1.8 - 2 is not quite -0.2.
+                    near = round(value, 12)
+                    value = near if abs(near - value) < 4e-16 else value
+            found.append(value)
         return tuple(found)
 
     def task(self, task: Task) -> Task:
