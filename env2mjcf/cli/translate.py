@@ -11,7 +11,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
-from ..options import DialectName, PathArgument, Semantics
+from ..options import DialectName, Limits, PathArgument, Semantics
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_diagnostics, print_json, print_parts
 
@@ -46,6 +46,7 @@ class Translate:
         allow_outside: May a problem name files outside its folder.
         box: A boundary for a scene that has none, in file units; dialects C to E must have one.
         strict: Refuse whatever would be lost.
+        limits: Bounds on hostile input.
         output: How to report.
     """
 
@@ -60,6 +61,7 @@ class Translate:
     allow_outside: bool = False
     box: Annotated[tuple[float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X0 X1 ... Z1")] = None
     strict: bool = False
+    limits: Limits = field(default_factory=Limits)
     output: OutputFlags = field(default_factory=Output)
 
     def run(self) -> int:
@@ -94,7 +96,7 @@ class Translate:
         return Boundary(BoundaryShape.BOX, lower, upper)
 
     def _options(self) -> dict[str, Any]:
-        names = ("robots", "query", "semantics", "strict", "mesh_dirs", "allow_outside")
+        names = ("robots", "query", "semantics", "strict", "mesh_dirs", "allow_outside", "limits")
         return {"dialect": self.read_as, **{name: getattr(self, name) for name in names}}
 
 
