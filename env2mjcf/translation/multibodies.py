@@ -89,6 +89,9 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
 def _label(source: MultiBody, losses: Losses) -> str | None:
     if source.kind is not MultiBodyKind.SURFACE:
         return None
+    if losses.vocabulary.options and source.dialect is not losses.dialect:
+        # Dialect D's planner insists on a label (env-format section 7).
+        return source.label or "surface"
     if losses.vocabulary.limits:
         return source.label
     if source.label is not None:
