@@ -208,6 +208,7 @@ CATALOGUE: dict[str, str] = {
     "CFG532": "A path, roadmap or query cannot be written.",
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
+    "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",

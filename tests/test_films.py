@@ -40,7 +40,7 @@ def decoded(file: Path) -> tuple[dict, list[np.ndarray]]:
 
 def blue(picture: np.ndarray) -> np.ndarray:
     """Return the corners (x, y) of the box around what has a robot's blue, (2, 2)."""
-    found = np.argwhere(picture[..., 2] - picture[..., 0] > 50)[:, ::-1]
+    found = np.argwhere(picture[..., 2] > 1.4 * picture[..., 0] + 10)[:, ::-1]
     return np.array([found.min(axis=0), found.max(axis=0) + 1])
 
 

@@ -36,8 +36,9 @@ class Plan:
     goal, is written beside the output: out.approach.path for out.path. A start or goal that is not valid is a finding,
     too: it is said who touches, and nothing is written.
 
-    Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT. All are OMPL's.
-    auto takes turns: RRTConnect and KPIECE. RRTstar and PRMstar use all of the time.
+    Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT (all of OMPL) and
+    BatchEST (ours: trees that grow by small changes, for narrow places). auto lets RRTConnect and BatchEST take turns.
+    RRTstar and PRMstar use all of the time.
 
     Examples:
       env2mjcf plan maze.env --robots maze.robot --query maze.query -o maze.path
