@@ -116,7 +116,7 @@ def _report_bases(source: MultiBody, losses: Losses) -> None:
     if losses.vocabulary.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
         losses.lost(
             "ENV176", bases[1].filename,
-            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one", "make a robot of each",
+            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one", "split the robot",
             bases[1].span,
         )  # fmt: skip
 
