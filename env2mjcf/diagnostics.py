@@ -66,7 +66,7 @@ CATALOGUE: dict[str, str] = {
     "ENV173": "A dialect has no NonHolonomic robots; written as Active.",
     "ENV174": "A dialect has no surfaces.",
     "ENV175": "A robot's fixed base is tested against obstacles in dialects B to E, and not in A.",
-    "ENV176": "Dialect A has one robot, the first multibody, and the scene has several or none.",
+    "ENV176": "The planner of a dialect takes one robot, or one base of each, and the scene has several or none.",
     "ENV177": "Text files cannot express something that an XML file says; it is lost.",
     "ENV178": "The name of a mesh file is no single word.",
     "ENV179": "A translation cannot be written.",

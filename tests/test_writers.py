@@ -115,6 +115,16 @@ def test_no_header_line_stops_the_reader_of_dialect_a(read: Reader) -> None:
     assert text.startswith("# my environment\n")
 
 
+def test_header_lines_fit_what_dialect_a_reads(read: Reader) -> None:
+    scene = read("# " + "long " * 100 + "\n" + LEGACY.partition("\n")[2].replace("Passive", "Internal"))
+    lines = env_text(scene).splitlines()
+    header = lines[: lines.index("2")]
+    assert all(len(line) <= 240 and line[0] == "#" for line in header)
+    assert "".join(line.removeprefix("#") for line in header[:-1]).split() == ["long"] * 100
+    # Its planner knows Internal since this version.
+    assert header[-1] == "#Environment Version 20020327"
+
+
 def test_text_is_what_the_original_readers_take(read: Reader) -> None:
     legacy, b, d = (env_text(read(t)) for t in (LEGACY, B, D))
     assert "0 1 Actuated\n0.2 0 0 -90 0 0  90 0.3 0.4 30  Revolute  0.5 0 0 0 0 45\n" in legacy

@@ -31,6 +31,7 @@ def robot(source: MultiBody, meets_obstacles: bool, losses: Losses) -> MultiBody
     source = _without_controls(source, losses)
     if meets_obstacles:
         _report_fixed_base(source, losses)
+    _report_bases(source, losses)
     if source.adjacencies and not losses.vocabulary.adjacencies:
         losses.lost(
             "ENV172", "Adjacencies", f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
@@ -89,6 +90,9 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
 def _label(source: MultiBody, losses: Losses) -> str | None:
     if source.kind is not MultiBodyKind.SURFACE:
         return None
+    if losses.vocabulary.options and source.dialect is not losses.dialect:
+        # Dialect D's planner insists on a label (env-format section 7).
+        return source.label or "surface"
     if losses.vocabulary.limits:
         return source.label
     if source.label is not None:
@@ -105,6 +109,16 @@ def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
             "without controls and velocity bounds", "", source.span,
         )  # fmt: skip
     return replace(source, kind=MultiBodyKind.ACTIVE, velocity_bounds=None, controls=())
+
+
+def _report_bases(source: MultiBody, losses: Losses) -> None:
+    bases = [b for b in source.bodies if b.base is not BaseKind.JOINT]
+    if losses.vocabulary.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
+        losses.lost(
+            "ENV176", bases[1].filename,
+            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one", "split the robot",
+            bases[1].span,
+        )  # fmt: skip
 
 
 def _report_fixed_base(source: MultiBody, losses: Losses) -> None:

@@ -20,6 +20,8 @@ _RESOLUTION_TAGS = {
 }
 # They stand in front of their bodies, where they are written anew.
 _DIRECTIVES = ("#VIZMO_COLOR", "#VIZMO_NAME")
+# Dialect A's reader has 256 characters for a comment.
+_LONGEST_HEADER = 240
 
 
 def env_text(environment: Environment) -> str:
@@ -30,9 +32,10 @@ def env_text(environment: Environment) -> str:
     """
     dialect = environment.dialect
     inside = [m for m in environment.multibodies if m.robot_file is None]
-    lines = [*_comments(environment.comments, dialect)]
-    if dialect is not Dialect.A:
-        lines += _preamble(environment)
+    if dialect is Dialect.A:
+        lines = [*_legacy_comments(environment)]
+    else:
+        lines = [*_comments(environment.comments), *_preamble(environment)]
     lines.append(str(len(inside)))
     for multibody in inside:
         lines.append("")
@@ -50,15 +53,24 @@ def _joined(lines: Iterable[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _comments(comments: Iterable[Comment], dialect: Dialect) -> Iterator[str]:
-    for comment in comments:
-        words = comment.text.split()
-        if words[0] in _DIRECTIVES:
-            continue
+def _comments(comments: Iterable[Comment]) -> Iterator[str]:
+    return (c.text for c in comments if c.text.split()[0] not in _DIRECTIVES)
+
+
+def _legacy_comments(environment: Environment) -> Iterator[str]:
+    """Yield comments that dialect A's reader takes in front of the count (env-format section 3.1)."""
+    versioned = False
+    for text in _comments(environment.comments):
+        words = text.split()
         version = len(words) >= 3 and words[0] == "#Environment" and "Version" in words[1]
-        # Dialect A's reader stops at any other header line with this word in it (env-format section 3.1).
-        hostile = dialect is Dialect.A and "Environment" in comment.text and not version
-        yield comment.text.replace("Environment", "environment") if hostile else comment.text
+        versioned |= version
+        # It stops at any other header line with this word in it, and reads so many characters of a line.
+        safe = text if version else text.replace("Environment", "environment")
+        yield safe[:_LONGEST_HEADER]
+        for at in range(_LONGEST_HEADER, len(safe), _LONGEST_HEADER - 1):
+            yield f"#{safe[at : at + _LONGEST_HEADER - 1]}"
+    if not versioned and any(m.kind is MultiBodyKind.INTERNAL for m in environment.multibodies):
+        yield "#Environment Version 20020327"
 
 
 def _preamble(environment: Environment) -> Iterator[str]:
