@@ -214,4 +214,5 @@ CATALOGUE: dict[str, str] = {
     "CFG542": "A planned path cannot be written.",
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
+    "CFG552": "A picture or film cannot be written.",
 }

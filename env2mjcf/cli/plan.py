@@ -13,9 +13,10 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import ConversionError, DiagnosticLog, FormatError
+from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -79,7 +80,8 @@ class Plan:
         from ..simulation.preparing import load
 
         known(self.planner)
-        _refuse(self.out)
+        if self.out is not None:
+            refuse_unwritable(self.out, "CFG542")
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
@@ -146,18 +148,6 @@ class Plan:
             parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
             parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
         print_parts(parts)
-
-
-def _refuse(out: PathArgument | None) -> None:
-    """Refuse what cannot be written before time is spent on it."""
-    if out is None:
-        return
-    path = Path(out)
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a folder" if path.is_dir() else f"lies in {path.parent}, which is no folder"
-        DiagnosticLog().fail(
-            ConversionError, "CFG542", str(path), f"{path} {what}; expected a file to write", hint="name another output"
-        )
 
 
 def dense(scene: Scene, result: Result) -> np.ndarray:
