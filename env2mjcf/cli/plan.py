@@ -81,7 +81,8 @@ class Plan:
 
         known(self.planner)
         if self.out is not None:
-            refuse_unwritable(self.out, "CFG542")
+            query = () if self.options.query is None else (self.options.query,)
+            refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
