@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 
 from ..errors import Env2MjcfError, did_you_mean
-from ..view.offscreen import RenderError
+from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
 from .printing import one_line, print_diagnostics, print_json
 
@@ -114,6 +114,7 @@ def _version() -> str:
 
 def _run(name: str, verb: Verb) -> int:
     try:
+        refuse_unknown()  # or whatever imports MuJoCo would fail
         return verb.run()
     except Env2MjcfError as error:
         _show_traceback(verb.output.debug)
