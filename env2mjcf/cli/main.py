@@ -13,7 +13,7 @@ from importlib import import_module
 from ..errors import Env2MjcfError, did_you_mean
 from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
-from .printing import one_line, print_diagnostics, print_json
+from .printing import one_line, print_diagnostics, print_json, printable
 
 DONE, FINDING, WRONG_USAGE, BAD_INPUT, FAULT = range(5)
 # What shells report for a program that is stopped by SIGINT or SIGPIPE.
@@ -143,7 +143,7 @@ def _fault(error: Exception, debug: bool = False) -> int:
 
 def _show_traceback(debug: bool) -> None:
     if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
-        traceback.print_exc()
+        print(printable(traceback.format_exc()), end="", file=sys.stderr)
 
 
 def _complain(message: str) -> None:

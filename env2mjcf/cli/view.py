@@ -15,7 +15,7 @@ from tyro.conf import Positional
 from ..errors import DiagnosticLog
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import print_diagnostics, print_json, working
+from .printing import one_line, print_diagnostics, print_json, working
 
 if TYPE_CHECKING:
     from ..simulation.scene import Scene
@@ -92,7 +92,7 @@ class View:
 
         port = web_server.free_port(self.port)
         try:
-            with web_server.serving(port, f"env2mjcf: {scene.environment.name}") as server:
+            with web_server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as server:
                 viewer = Viewer(server, scene, path)
                 self._announce(server.get_port(), log)
                 try:
