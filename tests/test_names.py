@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
 import sys
 import unicodedata
 from pathlib import Path
@@ -209,6 +210,17 @@ def test_words_of_the_command_line_are_no_commands(capsys: pytest.CaptureFixture
     # And a word that is no option may hold what it likes.
     assert main(["info", "\x1b[2J.env"]) == 3
     assert "there is no file \\x1b[2J.env" in capsys.readouterr().err
+
+
+def test_what_libraries_say_is_no_command_either() -> None:
+    code = (
+        "import sys, warnings, logging; sys.argv = ['env2mjcf', '--version']; from env2mjcf.cli.main import main; main();"
+        "warnings.warn('\\x1b[2Ja'); logging.getLogger('trimesh').warning('\\x1b]0;b\\x07')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "\\x1b[2Ja" in done.stderr
+    assert "\\x1b]0;b" in done.stderr
+    assert_harmless(done.stderr)
 
 
 # The page.

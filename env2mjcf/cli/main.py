@@ -13,7 +13,7 @@ from importlib import import_module
 from ..errors import Env2MjcfError, did_you_mean
 from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
-from .printing import one_line, print_diagnostics, print_json, printable
+from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
 
 DONE, FINDING, WRONG_USAGE, BAD_INPUT, FAULT = range(5)
 # What shells report for a program that is stopped by SIGINT or SIGPIPE.
@@ -64,6 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        tame_libraries()  # the process is the program's own
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of files come out as they are where that is possible, and never as an error.
         utf8 = sys.stdout.encoding.lower() in ("utf-8", "utf8")
