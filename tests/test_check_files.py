@@ -218,9 +218,6 @@ def test_a_picture_shows_what_is_valid_in_green_and_what_is_not_in_red(check, tm
     red, green, blue = np.moveaxis(pixels, -1, 0)
     assert ((green > red + 40) & (green > blue + 25)).sum() > 200
     assert ((red > green + 80) & (red > blue + 80)).sum() > 200
-    (tmp_path / "x.path").write_text(f"{HEAD}0\n")
-    assert check("x.path", "--picture", "empty.png").status == 0
-    assert (tmp_path / "empty.png").exists()
 
 
 def test_a_picture_that_cannot_be_drawn_is_one_sentence(check, monkeypatch: pytest.MonkeyPatch) -> None:
