@@ -212,6 +212,7 @@ CATALOGUE: dict[str, str] = {
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",
+    "CFG543": "Nothing moves in a scene, so that it has no configurations, paths or plans.",
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
     "CFG552": "A picture or film cannot be written.",

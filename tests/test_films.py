@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.companions import read_path, write_path
 from env2mjcf.view import film, offscreen
+from env2mjcf.view.encoding import encoder
 from env2mjcf.view.trails import paced, reference_points
 
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")
@@ -109,8 +112,11 @@ def test_a_path_that_stands_still_is_a_still(cubes: env2mjcf.Scene) -> None:
     [
         ("a.avi", {}, r"expected \.mp4 or \.gif"),
         ("a", {}, "ends in nothing"),
-        ("a.mp4", {"fps": 0}, "expected positive"),
-        ("a.mp4", {"seconds": -1.0}, "expected positive"),
+        ("a.mp4", {"fps": 0}, "^fps is 0; expected 1 to 1000$"),
+        ("a.gif", {"fps": 51}, r"^fps is 51; a \.gif has at most 50 pictures a second"),
+        ("a.mp4", {"seconds": -1.0}, "^seconds is -1.0; expected a positive"),
+        ("a.mp4", {"seconds": 1e15}, "^seconds is 1e.15, at 25 pictures a second; expected a film of at most 10000"),
+        ("a.mp4", {"size": (1, 1)}, "^size is 1 x 1 pixels; expected at least 2 x 2"),
     ],
 )
 def test_an_impossible_film_says_what_is_possible(
@@ -119,6 +125,46 @@ def test_an_impossible_film_says_what_is_possible(
     with pytest.raises(ValueError, match=message):
         film(cubes, PATH, tmp_path / name, **arguments)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"fps": math.nan}, "^fps is nan; expected a whole number"),
+        ({"fps": 12.5}, "^fps is 12.5; expected a whole number"),
+        ({"seconds": "3"}, "^seconds is '3'; expected a number"),
+        ({"size": "160x120"}, "^size is '160x120'; expected width and height"),
+        ({"size": (160.0, 120)}, "^size is "),
+        ({"camera": 3}, "^camera is 3; expected a Viewpoint"),
+    ],
+)
+def test_an_argument_of_a_wrong_kind_is_named(
+    cubes: env2mjcf.Scene, tmp_path: Path, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(TypeError, match=message):
+        film(cubes, PATH, tmp_path / "a.mp4", **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_gif_is_quicker_than_players_play_it() -> None:
+    with pytest.raises(ValueError, match="fps is 51"):
+        encoder("a.GIF", 51)
+    encoder("a.gif", 50)
+
+
+@pytest.mark.parametrize("fps", [30, 45, 50])
+def test_a_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: int) -> None:
+    from PIL import Image
+
+    # No two pictures are alike: equal ones are joined.
+    pictures = (np.full((4, 4, 3), shade, dtype=np.uint8) for shade in range(0, 180, 2))
+    encoder("a.gif", fps)(tmp_path / "a.gif", pictures, fps)
+    shown = Image.open(tmp_path / "a.gif")
+    total = 0
+    for i in range(shown.n_frames):
+        shown.seek(i)
+        total += shown.info["duration"]
+    assert total - 1000 == pytest.approx(90 / fps * 1000, abs=10)
 
 
 @needs_gl
@@ -203,6 +249,16 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     assert (shown.returncode, shown.stdout) == (3, "")
     assert "error CFG552: none/a." in shown.stderr
     assert "lies in none, which is no folder" in shown.stderr
+
+
+def test_a_gl_library_that_is_none_is_wrong_usage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_scene(tmp_path, free_cube())
+    monkeypatch.setenv("MUJOCO_GL", "bogus")
+    for words in (("render", "scene.env", "-o", "a.png"), ("info", "scene.env")):
+        shown = run(*words, folder=tmp_path)
+        assert (shown.returncode, shown.stdout) == (2, "")
+        assert f"{words[0]}: MUJOCO_GL is 'bogus'; expected " in shown.stderr
+        assert "or disable for no pictures, or leave it unset" in shown.stderr
 
 
 def test_without_gl_render_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,7 +110,14 @@ class Check:
             with working("drawing"):
                 draw(scene, rows, judge, edges, self.picture)
         if self.output.json:
-            print_json({"valid": valid, "dofs": scene.space.names, **as_json(judge, rows.graph, edges)})
+            print_json(
+                {
+                    "valid": valid,
+                    "dofs": scene.space.names,
+                    **as_json(judge, rows.graph, edges),
+                    "diagnostics": tuple(log),
+                }
+            )
         else:
             print_parts(self._lines(judge, rows.graph, edges))
         return 0 if valid else 1

@@ -16,6 +16,7 @@ from tyro.conf import Positional
 from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .configurations import refuse_without_freedom
 from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
@@ -90,7 +91,7 @@ class Plan:
         query = self._query(scene, log)
         print_diagnostics(log, self.output.verbose)
         if (wrong := _wrong(scene, query)) is not None:
-            self._say_wrong(wrong)
+            self._say_wrong(wrong, log)
             return 1
         from .planning_meter import PlanningMeter
 
@@ -101,7 +102,7 @@ class Plan:
             )  # fmt: skip
         written = self._write(scene, query.robot, result)
         if self.output.json:
-            print_json(_summary(scene, result, written))
+            print_json({**_summary(scene, result, written), "diagnostics": tuple(log)})
         else:
             print_parts(_lines(result, written))
         return 0 if result.solved else 1
@@ -110,9 +111,10 @@ class Plan:
         """Return the task that is to be planned.
 
         Raises:
-            FormatError: There is none, or it has no goal.
+            FormatError: Nothing in the scene moves, there is no task, or it has no goal.
             ValueError: There are not so many.
         """
+        refuse_without_freedom(scene, self.scene, log)
         tasks = scene.queries
         if not tasks:
             log.fail(
@@ -120,7 +122,8 @@ class Plan:
                 hint="give a query file: --query FILE",
             )  # fmt: skip
         if not 1 <= self.task <= len(tasks):
-            raise ValueError(f"--task {self.task}: there are {len(tasks)} tasks, counted from 1")
+            count = "there is 1 task" if len(tasks) == 1 else f"there are {len(tasks)} tasks"
+            raise ValueError(f"--task is {self.task}: {count}, counted from 1")
         task = tasks[self.task - 1]
         if len(task.q) < 2:
             log.fail(
@@ -140,9 +143,9 @@ class Plan:
         q = result.path if self.corners else dense(scene, result)
         return write_path(scene, q, out, robot)
 
-    def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]]) -> None:
+    def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
         if self.output.json:
-            print_json({"solved": False, "invalid": dict(wrong)})
+            print_json({"solved": False, "invalid": dict(wrong), "diagnostics": tuple(log)})
             return
         parts: list[Text] = []
         for label, reasons in wrong:

@@ -34,8 +34,11 @@ def known(name: str) -> str:
     """Return the name of a planner as it is listed, whatever its case; OMPL's own names will do.
 
     Raises:
+        TypeError: It is no word.
         ValueError: There is no such planner; the message lists all.
     """
+    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"planner is {name!r}; expected one of {', '.join(PLANNERS)}")
     spelled = {n.lower(): n for n in PLANNERS} | {c.lower(): n for n, c in OMPL_PLANNERS.items()}
     if name.lower() not in spelled:
         guess = did_you_mean(name, PLANNERS)
