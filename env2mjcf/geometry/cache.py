@@ -166,7 +166,8 @@ class GeometryCache:
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
                 with beside.open("xb") as file:
-                    np.savez(file, allow_pickle=False, digest=_digest(key, arrays), **arrays)
+                    # `pack` stores plain numbers only. The argument allow_pickle is an array's name to numpy below 2.1.
+                    np.savez(file, digest=_digest(key, arrays), **arrays)
                 os.replace(beside, path)
             finally:
                 beside.unlink(missing_ok=True)
