@@ -14,6 +14,8 @@ from real_scenes import scene_names
 
 import env2mjcf
 
+pytest.importorskip("fcl", reason="no python-fcl to compare with")
+
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 import verdicts
@@ -36,7 +38,7 @@ def case(corpus: Path, name: str) -> Case:
 def test_no_verdict_is_wrong_outside_the_band(corpus: Path, name: str, engine: str) -> None:
     """`auto` against triangles and containment, `surface` against triangles alone, both directions of error."""
     if engine == "exact":
-        pytest.importorskip("numba")
+        pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
     result = verdicts.examine(case(corpus, name), COUNT, seed=2, engine=engine)
     for mode, tally in result.tallies.items():
         assert tally.outside == []

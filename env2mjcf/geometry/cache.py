@@ -166,8 +166,9 @@ class GeometryCache:
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
                 with beside.open("xb") as file:
-                    # `pack` stores plain numbers only. The argument allow_pickle is an array's name to numpy below 2.1.
-                    np.savez(file, digest=_digest(key, arrays), **arrays)
+                    # `pack` holds plain numbers only, and allow_pickle=False names one more array to numpy below 2.1.
+                    entry: dict[str, Any] = {"digest": _digest(key, arrays), **arrays}
+                    np.savez(file, **entry)
                 os.replace(beside, path)
             finally:
                 beside.unlink(missing_ok=True)
