@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from extras import needs
 from meshes import channel
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from truth import Truth, bisected, near_obstacles
@@ -18,7 +18,7 @@ import env2mjcf
 import env2mjcf.contact.exact.engine as exact_engine
 from env2mjcf.formats.byu import export_byu
 
-needs_numba = pytest.mark.skipif(find_spec("numba") is None, reason="no numba: pip install 'env2mjcf[fast]'")
+needs_numba = needs("fast")
 
 # With obstacles, and with a free side to bisect from.
 SCENES = ("alpha/alpha", "bug-trap/bug-trap", "maze/maze", "spherical-arm/spherical-arm", "two-robots/two-robots")

@@ -14,16 +14,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from extras import PACKAGES
 from scenes import MODELS
 
 HIDING = Path(__file__).with_name("without")
-PACKAGES = {
-    "fast": ("numba", "llvmlite"),
-    "view": ("PIL", "imageio", "imageio_ffmpeg", "viser"),
-    "planning": ("ompl",),
-    "dask": ("dask", "distributed"),
-    "decompose": ("coacd",),
-}
 EVERYTHING = tuple(name for names in PACKAGES.values() for name in names)
 SEED, MAZE, BUG_TRAP = (str(MODELS / p) for p in ("seed/seed.env", "maze/maze.xml", "bug-trap/bug-trap.env"))
 NEEDS = {

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import skip_without
 from real_scenes import scene_names
 
 import env2mjcf
@@ -38,7 +39,7 @@ def case(corpus: Path, name: str) -> Case:
 def test_no_verdict_is_wrong_outside_the_band(corpus: Path, name: str, engine: str) -> None:
     """`auto` against triangles and containment, `surface` against triangles alone, both directions of error."""
     if engine == "exact":
-        pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
+        skip_without("fast")
     result = verdicts.examine(case(corpus, name), COUNT, seed=2, engine=engine)
     for mode, tally in result.tallies.items():
         assert tally.outside == []
