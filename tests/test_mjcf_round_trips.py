@@ -1,4 +1,4 @@
-"""What is left of our MJCF after MuJoCo has written it itself: `mj_saveLastXML`, `MjSpec`, its archives, `attach`, `.mjb`.
+"""What is left of our MJCF after MuJoCo has written it: `mj_saveLastXML`, `MjSpec`, its archives, `attach`, `.mjb`.
 
 MuJoCo writes six significant digits. Every way that goes through text is therefore tried twice: as it is, where
 everything may be moved by what the lost digits weigh, and with as many digits as a double needs, where nothing may
