@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from extras import needs
 from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
@@ -208,9 +208,12 @@ def test_wrong_usage(check) -> None:
     assert (found.status, "units of their own" in found.err) == (2, True)
 
 
+@needs("view")
 def test_a_picture_shows_what_is_valid_in_green_and_what_is_not_in_red(check, tmp_path: Path) -> None:
     if backend() is None:
         pytest.skip("no pictures on this machine")
+    from PIL import Image
+
     found = check("x.path", "--resolution", 0.1, "--picture", "x.png")
     assert found.status == 1
     pixels = np.asarray(Image.open(tmp_path / "x.png").convert("RGB")).astype(int)

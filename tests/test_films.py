@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cameras import projected
+from extras import needs
 from scenes import free_cube, write_scene
 
 import env2mjcf
@@ -22,6 +23,7 @@ from env2mjcf.view.encoding import encoder
 from env2mjcf.view.trails import paced, reference_points
 
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")
+needs_view = needs("view")
 CORNERS = np.array([[x, y, z, 1] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 PATH = np.array([[-3, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 3.0], [3, 2, 0, 0, 0, -3.0]])
 
@@ -34,7 +36,8 @@ def cubes(tmp_path_factory: pytest.TempPathFactory) -> env2mjcf.Scene:
 
 def decoded(file: Path) -> tuple[dict, list[np.ndarray]]:
     """Return what a film's header says, and its pictures."""
-    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    import imageio_ffmpeg
+
     frames: Iterator = imageio_ffmpeg.read_frames(str(file))
     head = next(frames)
     width, height = head["size"]
@@ -48,6 +51,7 @@ def blue(picture: np.ndarray) -> np.ndarray:
 
 
 @needs_gl
+@needs_view
 def test_the_robot_in_a_film_follows_the_path(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     free = PATH[:2]
     made = film(cubes, free, tmp_path / "a.mp4", seconds=2, fps=10, size=(641, 481), camera="top", ghosts=False)
@@ -67,6 +71,7 @@ def test_the_robot_in_a_film_follows_the_path(cubes: env2mjcf.Scene, tmp_path: P
 
 
 @needs_gl
+@needs_view
 def test_what_touches_is_red_for_as_long_as_it_does(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     made = film(cubes, PATH, tmp_path / "a.mp4", seconds=2, fps=10, size=(320, 240), ghosts=False)
     np.testing.assert_array_equal(made.in_contact, cubes.in_collision(made.q))
@@ -76,8 +81,10 @@ def test_what_touches_is_red_for_as_long_as_it_does(cubes: env2mjcf.Scene, tmp_p
 
 
 @needs_gl
+@needs_view
 def test_a_gif_has_as_many_pictures(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
-    image = pytest.importorskip("PIL.Image")
+    from PIL import Image as image
+
     made = film(cubes, PATH, tmp_path / "a.gif", seconds=1.5, fps=10, size=(160, 120))
     with image.open(made.file) as opened:
         durations = []
@@ -107,6 +114,7 @@ def test_a_path_that_stands_still_is_a_still(cubes: env2mjcf.Scene) -> None:
     np.testing.assert_array_equal(q, PATH[[0] * 5])
 
 
+@needs_view
 @pytest.mark.parametrize(
     ("name", "arguments", "message"),
     [
@@ -168,6 +176,7 @@ def test_a_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: int) -> None:
 
 
 @needs_gl
+@needs_view
 @pytest.mark.parametrize(
     ("scene", "path"),
     [
@@ -196,6 +205,7 @@ def run(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 @needs_gl
+@needs_view
 def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("0 2.5 0 0 0 0"))
     write_path(cubes, PATH, tmp_path / "a.path")
@@ -210,6 +220,7 @@ def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> N
 
 
 @needs_gl
+@needs_view
 def test_render_draws_a_query_a_trail_and_contacts(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("0 2.5 0 0 0 0"))
     write_path(cubes, PATH, tmp_path / "a.path")
@@ -237,6 +248,7 @@ def test_render_refuses_what_it_cannot_do(words: tuple[str, ...], message: str, 
     assert message in shown.stderr
 
 
+@needs_view
 @pytest.mark.parametrize("words", [("render",), ("play", "a.path"), ("check", "a.path")])
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     cubes: env2mjcf.Scene, words: tuple[str, ...], tmp_path: Path

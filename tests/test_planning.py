@@ -19,7 +19,7 @@ from truth import Truth
 import env2mjcf
 from env2mjcf.cli.main import main
 
-pytest.importorskip("ompl")
+pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
 from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
 from env2mjcf.planning.bridge import state_space

@@ -76,11 +76,12 @@ class Plan:
 
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
-        from ..planning.names import known
+        from ..planning.names import installed
         from ..planning.planning import plan_through
         from ..simulation.preparing import load
 
-        known(self.planner)
+        # Before anything is loaded and looked at, which may take a minute.
+        installed(self.planner)
         if self.out is not None:
             query = () if self.options.query is None else (self.options.query,)
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))

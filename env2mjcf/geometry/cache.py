@@ -166,7 +166,9 @@ class GeometryCache:
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
                 with beside.open("xb") as file:
-                    np.savez(file, allow_pickle=False, digest=_digest(key, arrays), **arrays)
+                    # `pack` holds plain numbers only, and allow_pickle=False names one more array to numpy below 2.1.
+                    entry: dict[str, Any] = {"digest": _digest(key, arrays), **arrays}
+                    np.savez(file, **entry)
                 os.replace(beside, path)
             finally:
                 beside.unlink(missing_ok=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 from ..errors import did_you_mean
 
 # The names that are asked for, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
@@ -46,3 +48,15 @@ def known(name: str) -> str:
             f"there is no planner {name!r}{f'; {guess}' if guess else ''} (planners: {', '.join(PLANNERS)})"
         )
     return spelled[name.lower()]
+
+
+def installed(name: str) -> str:
+    """Return the name of a planner as it is listed; see `known`.
+
+    Raises:
+        ValueError: There is no such planner, or OMPL is not installed.
+    """
+    spelled = known(name)
+    if find_spec("ompl") is None:
+        raise ValueError(f"planner {spelled} needs one more package: pip install 'env2mjcf[planning]'")
+    return spelled
