@@ -19,8 +19,8 @@ T = TypeVar("T")
 class Lock:
     """A reentrant lock that a forked child finds open.
 
-    It must guard nothing but the making of objects that are assigned when they are whole: what another thread had begun
-    when the process was forked is simply made again.
+    It must guard nothing that the child would find half done. What is made under it is assigned when it is whole: what
+    another thread had begun when the process was forked is simply made again.
     """
 
     def __init__(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -10,6 +11,7 @@ import time
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -49,16 +51,23 @@ class Gauges:
 
     Args:
         temporary: The folder of temporary files.
+
+    Attributes:
+        largest_cache: Bytes that MuJoCo's own cache of assets held at most.
     """
 
     def __init__(self, temporary: Path) -> None:
         self._temporary = temporary
         self._began = time.monotonic()
         self._libc = ctypes.CDLL(None)
+        self.largest_cache = 0
 
     def read(self, operations: int) -> Reading:
         """Return a reading, after all garbage is collected and given back."""
         gc.collect()
+        # MuJoCo keeps the assets of every folder that a model was loaded from, up to 500 MiB: its cache, and bounded.
+        self.largest_cache = max(self.largest_cache, mujoco.mj_getCacheSize(mujoco.mj_getCache()))
+        mujoco.mj_clearCache(mujoco.mj_getCache())
         # Without this, freed memory that the C library keeps for later looks like a leak, and comes and goes.
         if hasattr(self._libc, "malloc_trim"):
             self._libc.malloc_trim(0)
@@ -81,10 +90,8 @@ def child_processes() -> list[int]:
     """Return the children of this process, whichever thread of it started them."""
     found: list[int] = []
     for task in Path("/proc/self/task").iterdir():
-        try:
+        with contextlib.suppress(FileNotFoundError):  # the thread has ended
             found += map(int, (task / "children").read_text().split())
-        except FileNotFoundError:
-            pass  # the thread has ended
     return found
 
 
