@@ -200,20 +200,16 @@ class Operations:
 
     def companions(self, known: Known) -> None:
         """Write and read a path, a roadmap and a query."""
-        scene, q = (
-            known.scene,
-            known.scene.space.wrap(known.q[:8]) if hasattr(known.scene.space, "wrap") else known.q[:8],
-        )
+        scene, edges = known.scene, np.array([[0, 1], [1, 2], [3, 4]])
         others = np.ones(scene.space.dim, dtype=bool)
         others[scene.space.robot_slices[0]] = False
-        q = np.where(others, scene.space.home, q)
+        q = np.where(others, scene.space.home, known.q[:8])
         with self._place() as folder:
-            edges = np.array([[0, 1], [1, 2], [3, 4]])
-            again = [
-                env2mjcf.read_path(scene, env2mjcf.write_path(scene, q, folder / "a.path")).q,
-                env2mjcf.read_roadmap(scene, env2mjcf.write_roadmap(scene, env2mjcf.Roadmap.of(q, edges), folder / "a.map")).q,
-                env2mjcf.read_query(scene, env2mjcf.write_query(scene, env2mjcf.Query(0, q), folder / "a.query"))[0].q,
-            ]  # fmt: skip
+            path = env2mjcf.write_path(scene, q, folder / "a.path")
+            roadmap = env2mjcf.write_roadmap(scene, env2mjcf.Roadmap.of(q, edges), folder / "a.map")
+            query = env2mjcf.write_query(scene, env2mjcf.Query(0, q), folder / "a.query")
+            read = env2mjcf.read_path(scene, path), env2mjcf.read_roadmap(scene, roadmap)
+            again = [*(r.q for r in read), env2mjcf.read_query(scene, query)[0].q]
         for rows in again:
             if rows.shape != q.shape or not np.allclose(scene.space.difference(rows, q), 0, atol=1e-9):
                 raise Wrong(f"{known.name}: configurations changed on their way through a file")

@@ -76,8 +76,8 @@ class Soak:
         checked, work = sum(k.checked for k in self.known), self.operations
         return (
             f"soak: {last.seconds - first.seconds:.0f} s, {sum(self.done.values())} operations of {len(self.done)} "
-            f"kinds on {len(self.known)} scenes, {work.configurations} configurations, {work.expected_errors} bad inputs "
-            f"refused, {work.pictures} pictures; {checked} verdicts compared with fcl or golden vectors; memory "
+            f"kinds on {len(self.known)} scenes, {work.configurations} configurations, {work.expected_errors} bad "
+            f"inputs refused, {work.pictures} pictures; {checked} verdicts compared with fcl or golden vectors; memory "
             f"{first.memory / 2**20:.0f} to {last.memory / 2**20:.0f} MiB, slope {slope(self.readings, 'memory'):+.0f} "
             f"bytes an operation ({self.growth() / 2**20:+.1f} MiB in all), MuJoCo's cache at most "
             f"{self.gauges.largest_cache / 2**20:.0f} MiB, children "

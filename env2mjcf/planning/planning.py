@@ -20,8 +20,8 @@ from .result import Plan, Progress
 from .space import PlanningSpace
 from .watch import Watch
 
-# OMPL draws the seeds of all its random numbers from one generator of the process: what is planned in two threads at once
-# would depend on which is quicker.
+# OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
+# depend on which of them is quicker.
 _one_at_a_time = Lock()
 
 
