@@ -114,6 +114,12 @@ def slope(readings: list[Reading], name: str, per: str = "operations") -> float:
     return float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else 0.0
 
 
+def steady_slope(readings: list[Reading], name: str) -> float:
+    """Return how much of something each operation adds in either half: what comes once, and stays, is no leak."""
+    middle = len(readings) // 2
+    return min(slope(readings[: middle + 1], name), slope(readings[middle:], name))
+
+
 def grown(readings: list[Reading]) -> list[str]:
     """Return a sentence on each count that is higher in every late reading than in any early one."""
     quarter = max(1, len(readings) // 4)

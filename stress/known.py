@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -92,12 +92,19 @@ def bytes_of(contacts: env2mjcf.PackedContacts) -> np.ndarray:
     return np.frombuffer(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays), dtype=np.uint8)
 
 
-def known_scenes(seed: int, *, models: int | None = None, real: int | None = None, truth: bool = True) -> list[Known]:
-    """Load scenes and note their answers: so many models of the project and real scenes (None: all that are small)."""
-    return [
-        _known(name, path, options, seed, truth)
-        for name, path, options in (*list(_models())[:models], *list(_real())[:real])
-    ]
+def known_scenes(
+    seed: int, *, models: Sequence[str] | None = None, real: int | None = None, truth: bool = True
+) -> list[Known]:
+    """Load scenes and note their answers.
+
+    Args:
+        seed: Of the configurations.
+        models: Which of the project's scenes; None: all.
+        real: How many real scenes at most; None: all that are small.
+        truth: Whether to compare answers with those of other programs.
+    """
+    own = [m for m in _models() if models is None or m[0] in models]
+    return [_known(name, path, options, seed, truth) for name, path, options in (*own, *list(_real())[:real])]
 
 
 def _models() -> Iterator[tuple[str, Path, dict[str, Any]]]:

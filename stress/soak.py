@@ -17,11 +17,11 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gauges import Gauges, Reading, grown, slope, table
+from gauges import Gauges, Reading, grown, slope, steady_slope, table
 from known import Known, known_scenes
 from operations import Operations
 
@@ -29,7 +29,12 @@ from operations import Operations
 # One scene that is never freed is a hundred thousand.
 PER_OPERATION = 4_000
 # Below this much growth in all, nothing is said.
-_LEAST = 8_000_000
+LEAST = 8_000_000
+# Scenes that everything is done with before anything is measured: what is loaded or made once does not count.
+_WARMED = 3
+
+# An operation, and how often it comes.
+Chosen = tuple[Callable[[Known], None], int]
 
 
 @dataclass(eq=False)
@@ -37,6 +42,7 @@ class Soak:
     """A long run.
 
     Attributes:
+        least: Growth in bytes that is not spoken of.
         readings: What the process held, from the end of the warm-up on.
         findings: What went wrong.
         done: How often each operation was done.
@@ -46,21 +52,27 @@ class Soak:
     known: list[Known]
     gauges: Gauges
     rng: random.Random
+    least: float = LEAST
     readings: list[Reading] = field(default_factory=list)
     findings: list[str] = field(default_factory=list)
     done: Counter[str] = field(default_factory=Counter)
 
     def run(self, seconds: float, every: float, only: tuple[str, ...] = ()) -> None:
         """Warm up, then work for so long, and take a reading from time to time."""
-        chosen = {n: o for n, o in self.operations.all().items() if not only or n in only}
+        self.work({n: o for n, o in self.operations.all().items() if not only or n in only}, seconds, every)
+
+    def work(self, chosen: Mapping[str, Chosen], seconds: float, every: float) -> None:
+        """Do the same with these operations."""
         for name, (operation, _) in chosen.items():
-            self._do(name, operation)
+            for known in self.known[:_WARMED]:
+                self._do(name, operation, known)
         self._work(chosen, seconds / 4, every)
         self.readings.clear()
         self._work(chosen, seconds, every)
         self.findings += grown(self.readings)
-        if self.growth() > PER_OPERATION * self.span() and self.growth() > _LEAST:
-            self.findings.append(f"memory grew by {self.growth() / self.span():.0f} bytes an operation")
+        steady = steady_slope(self.readings, "memory")
+        if steady > PER_OPERATION and steady * self.span() > self.least:
+            self.findings.append(f"memory grew by {steady:.0f} bytes an operation")
 
     def span(self) -> int:
         """Return how many operations lie between the first reading and the last."""
@@ -87,18 +99,17 @@ class Soak:
             f"{first.objects} to {last.objects}; {len(self.findings)} findings"
         )
 
-    def _work(self, chosen: dict[str, tuple[Callable[[Known], None], int]], seconds: float, every: float) -> None:
+    def _work(self, chosen: Mapping[str, Chosen], seconds: float, every: float) -> None:
         names, weights = list(chosen), [weight for _, weight in chosen.values()]
         end, due = time.monotonic() + seconds, time.monotonic()
         while time.monotonic() < end:
             (name,) = self.rng.choices(names, weights)
-            self._do(name, chosen[name][0])
+            self._do(name, chosen[name][0], self.rng.choice(self.known))
             if time.monotonic() >= due:
                 self.readings.append(self.gauges.read(sum(self.done.values())))
                 due = time.monotonic() + every
 
-    def _do(self, name: str, operation: Callable[[Known], None]) -> None:
-        known = self.rng.choice(self.known)
+    def _do(self, name: str, operation: Callable[[Known], None], known: Known) -> None:
         self.done[name] += 1
         try:
             operation(known)
@@ -115,7 +126,9 @@ def main() -> int:
     parser.add_argument("--every", type=float, default=5, help="seconds between readings")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", action="append", default=[], help="an operation; may be given several times")
-    parser.add_argument("--models", type=int, default=None, help="how many scenes of models/")
+    parser.add_argument(
+        "--model", action="append", help="a scene of models/, such as maze/maze.env; may be given again"
+    )
     parser.add_argument("--real", type=int, default=None, help="how many real scenes")
     parser.add_argument("--table", type=Path, default=None, help="a file for all readings")
     arguments = parser.parse_args()
@@ -124,7 +137,7 @@ def main() -> int:
         (home / "tmp").mkdir()
         tempfile.tempdir = os.environ["TMPDIR"] = str(home / "tmp")
         os.environ["ENV2MJCF_CACHE_DIR"] = str(home / "cache")
-        known = known_scenes(arguments.seed, models=arguments.models, real=arguments.real)
+        known = known_scenes(arguments.seed, models=arguments.model, real=arguments.real)
         rng = random.Random(arguments.seed)
         operations = Operations(known, home / "tmp", rng)
         soak = Soak(operations, known, Gauges(home / "tmp"), rng, findings=[w for k in known for w in k.wrong])
