@@ -58,7 +58,6 @@ class Operations:
     def __init__(self, known: list[Known], folder: Path, rng: random.Random) -> None:
         self._known, self._folder, self._rng = known, folder, rng
         self._spawned = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
-        self._threads = ThreadPoolExecutor(3)
         self._drawn: dict[str, bytes] = {}
         self._converted: dict[str, bytes] = {}
         self.configurations = self.expected_errors = self.pictures = 0
@@ -82,7 +81,6 @@ class Operations:
     def close(self) -> None:
         """End the workers."""
         self._spawned.shutdown()
-        self._threads.shutdown()
 
     # Questions.
 
@@ -101,9 +99,13 @@ class Operations:
 
     def verdicts_elsewhere(self, known: Known) -> None:
         """Ask for verdicts on an executor."""
-        engine, pool = self._engine(), self._rng.choice((self._threads, self._spawned))
-        many = np.tile(known.q, (20, 1))
-        found = known.scene.in_collision(many, engine=engine, executor=pool)
+        engine, many = self._engine(), np.tile(known.q, (20, 1))
+        if self._rng.random() < 0.5:
+            found = known.scene.in_collision(many, engine=engine, executor=self._spawned)
+        else:
+            # Threads that stay would keep scratch data for each scene that they have ever been asked about.
+            with ThreadPoolExecutor(3) as pool:
+                found = known.scene.in_collision(many, engine=engine, executor=pool)
         self._same(known, "collisions", engine, found, np.tile(np.arange(len(known.q)), 20))
 
     def verdicts_after_fork(self, known: Known) -> None:
