@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import positive, whole
+from ..forking import Lock
 from ..simulation.scene import Scene
 from ..simulation.verdicts import Judge
 from ..transforms import Array
@@ -19,6 +20,10 @@ from .names import known
 from .result import Plan, Progress
 from .space import PlanningSpace
 from .watch import Watch
+
+# OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
+# depend on which of them is quicker.
+_one_at_a_time = Lock()
 
 
 def plan(
@@ -38,6 +43,7 @@ def plan(
 
     Every edge of a solution is checked at steps much finer than the planner's, and proved to be free where it keeps
     1e-5 of the extent away from everything (`Scene.edge_is_free`). Equal seeds give equal paths, unless time runs out.
+    A process plans one way at a time: a call in another thread waits, and its time begins afterwards.
 
     Args:
         scene: The scene.
@@ -92,15 +98,16 @@ def plan_through(
         raise ValueError(f"planner {name} needs one more package: pip install 'env2mjcf[planning]'")
     scene.warm_up()
     space = PlanningSpace(scene, rows, columns)
-    watch = Watch(time, len(rows) - 1, progress)
-    began, results = clock.perf_counter(), list[LegResult]()
-    for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
-        watch.leg = number
-        leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
-        results.append(leg.plan(start, goal))
-        if not results[-1].solved:
-            break
-    return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
+    with _one_at_a_time:
+        watch = Watch(time, len(rows) - 1, progress)
+        began, results = clock.perf_counter(), list[LegResult]()
+        for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
+            watch.leg = number
+            leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
+            results.append(leg.plan(start, goal))
+            if not results[-1].solved:
+                break
+        return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
 
 
 def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:

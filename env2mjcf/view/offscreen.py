@@ -77,7 +77,7 @@ def drawn(request: Mapping[str, Any]) -> Generator[tuple[dict[str, Any], IO[byte
         assert child.stdin is not None
         assert child.stdout is not None
         # A request may be longer than a pipe holds, and so may be what comes back.
-        feeder = threading.Thread(target=_feed, args=(child.stdin, json.dumps(request).encode()), daemon=True)
+        feeder = threading.Thread(target=_feed, args=(child.stdin, json.dumps(request).encode() + b"\n"), daemon=True)
         feeder.start()
         head = child.stdout.readline()
         if not head:
