@@ -215,4 +215,5 @@ CATALOGUE: dict[str, str] = {
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
     "CFG552": "A picture or film cannot be written.",
+    "CFG553": "A file that is no path stands where a path would be written; it is kept.",
 }

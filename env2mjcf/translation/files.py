@@ -12,7 +12,7 @@ from ..formats.query import query_text
 from ..formats.writers import env_text, robot_text
 from ..model import Dialect, Environment
 from ..options import PathArgument
-from ..writing import replaced
+from ..writing import output
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,8 @@ def write_environment(
         plain = environment.dialect in (Dialect.A, Dialect.E) and len(environment.robots) == 1
         texts[query] = query_text(environment.tasks, index=not plain)
     for path, text in {**texts, out: env_text(placed)}.items():
-        _write(path, text, log)
+        with output(path, "ENV179") as beside:
+            beside.write_bytes(text.encode("utf-8", "surrogateescape"))
     return Written(out, tuple(names), query, outside, tuple(log))
 
 
@@ -119,15 +120,3 @@ def _shown(folder: Path) -> Path:
     """Return a folder as one would name it: from the current folder, if it lies in that."""
     real, current = Path(os.path.realpath(folder)), Path(os.path.realpath(""))
     return real.relative_to(current) if real.is_relative_to(current) else real
-
-
-def _write(path: Path, text: str, log: DiagnosticLog) -> None:
-    try:
-        with replaced(path) as beside:
-            beside.write_bytes(text.encode("utf-8", "surrogateescape"))
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        log.fail(
-            ConversionError, "ENV179", str(path), f"{path} cannot be written: {reason}",
-            hint="choose another file; its folder must exist",
-        )  # fmt: skip

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..contact.types import Contact
 from ..simulation.scene import Scene
 from ..transforms import Array
-from ..writing import replaced
+from ..writing import output
 from .encoding import encoder
 from .framing import Camera, Viewpoint
 from .marks import TRAIL, Polyline
@@ -82,6 +82,7 @@ def film(
         advance: Called with the number of pictures that are done, and of all.
 
     Raises:
+        ConversionError: The film cannot be written.
         ValueError: The path, the file's ending, or a number is not what it should be.
         RenderError: It cannot be drawn here, or the extra `view`, which writes films, is not installed.
     """
@@ -99,7 +100,7 @@ def film(
     shades = paced(scene, path, _GHOSTS)[0] if ghosts else np.zeros((0, scene.space.dim))
     width, height = size[0] // 2 * 2, size[1] // 2 * 2  # films of odd sizes play nowhere
     shot = Shot(scene, frames, (width, height), camera, shades, marks, see_through)
-    with taken(shot) as (answer, stream), replaced(file) as beside:
+    with taken(shot) as (answer, stream), output(file, "CFG552") as beside:
         encode(beside, _pictures(stream, width, height, count, advance), fps)
     return Film(Path(os.fsdecode(file)), q, fps, touching, answer.camera)
 
