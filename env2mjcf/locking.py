@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from enum import Enum
 
 
@@ -30,3 +31,12 @@ def try_lock(handle: int) -> Lock:
     except OSError:
         return Lock.NONE
     return Lock.HELD
+
+
+def unlock(handle: int) -> None:
+    """Unlock what `try_lock` has locked, for processes, too, that were forked meanwhile and have it open."""
+    if sys.platform != "win32":
+        import fcntl
+
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_UN)
