@@ -53,7 +53,7 @@ class Staged:
     def __init__(self, folder: Path, name: str, xml: bytes, assets: Mapping[str, bytes]) -> None:
         self.folder = folder
         self.final = folder / f"{name}.xml"
-        self.path = folder / f".{name}-{secrets.token_hex(8)}.xml"
+        self.path = folder / _staged_name(name)
         self.assets = tuple(folder / relative for relative in assets)
         self._made: set[str] = set()
         self._handle, self._begun = -1, False
@@ -84,12 +84,24 @@ class Staged:
     def commit(self) -> None:
         """Give the scene its name, and remove the assets that only the scene of that name before it used."""
         with _alone(self.folder):
-            before = _named(self.final)
             self._close()
+            retired = self._retire()
             os.replace(self.path, self.final)
             # The scene is there: what cannot be tidied up is no reason to say that it is not.
             with suppress(OSError):
-                _remove(self.folder, before)
+                if retired is not None:
+                    _remove(self.folder, retired)
+
+    def _retire(self) -> Path | None:
+        """Keep the scene of this name that was there before under a staged name, if it has assets that go with it.
+
+        Whoever comes after a process that is killed knows from it what to remove.
+        """
+        if _named(self.final) <= {asset.name for asset in self.assets}:
+            return None
+        retired = self.path.with_name(_staged_name(self.final.stem))
+        retired.write_bytes(self.final.read_bytes())
+        return retired
 
     def discard(self) -> None:
         """Remove the staged MJCF and the assets that were written for it."""
@@ -97,8 +109,7 @@ class Staged:
         if not self._begun:
             return
         with suppress(OSError, FolderBusyError), _alone(self.folder):
-            self.path.unlink(missing_ok=True)
-            _remove(self.folder, self._made)
+            _remove(self.folder, self.path, self._made)
 
     def _close(self) -> None:
         handle, self._handle = self._handle, -1
@@ -125,6 +136,10 @@ def _alone(folder: Path) -> Generator[None]:
         os.close(handle)
 
 
+def _staged_name(name: str) -> str:
+    return f".{name}-{secrets.token_hex(8)}.xml"
+
+
 def _write_whole(handle: int, data: bytes) -> None:
     left = memoryview(data)
     while left:
@@ -137,9 +152,7 @@ def _remove_stale(folder: Path) -> None:
         handle = os.open(staged, os.O_RDONLY)
         try:
             if try_lock(handle) is not Lock.TAKEN:
-                named = _named(staged)
-                staged.unlink(missing_ok=True)
-                _remove(folder, named)
+                _remove(folder, staged)
         finally:
             os.close(handle)
     for staged in _old(folder / "assets", _STAGED_ASSET):
@@ -155,18 +168,20 @@ def _old(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
         ]  # fmt: skip
 
 
-def _remove(folder: Path, names: Iterable[str]) -> None:
-    """Remove assets that no scene of the folder names, be it a staged one.
+def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> None:
+    """Remove a staged scene, and before it those of its assets (or of the given ones) that no other scene names.
 
     Raises:
-        OSError: A scene cannot be read, and may name any of them.
+        OSError: Another scene cannot be read, and may name any of them.
     """
-    left = set(names)
+    left = _named(staged) if names is None else set(names)
     if left:
         for scene in folder.glob("*.xml"):
-            left -= _named(scene)
+            if scene != staged:
+                left -= _named(scene)
     for name in left:
         (folder / "assets" / name).unlink(missing_ok=True)
+    staged.unlink(missing_ok=True)
 
 
 def _named(xml: Path) -> set[str]:
