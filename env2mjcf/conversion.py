@@ -122,4 +122,7 @@ def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
             hint="choose another output folder, or change its permissions",
         )  # fmt: skip
     except OSError as error:
-        log.fail(ConversionError, "MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}")
+        log.fail(
+            ConversionError, "MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}",
+            hint="choose another output folder, or make room",
+        )  # fmt: skip

@@ -18,6 +18,7 @@ from lxml import etree
 from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
+from env2mjcf.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -184,3 +185,35 @@ def race(writers: list[tuple[list[Path], Path]], rounds: int, stop: Path) -> tup
         stop.touch()
         count, seen = reader.result()
     return count, wrong + seen
+
+
+def verb(words: list[str], before: Callable[[], object] = bool) -> tuple[int, str, str]:
+    """Run the program in a forked process; return its exit status, and what it printed to stdout and stderr.
+
+    Args:
+        words: Its arguments.
+        before: What to do in that process first.
+    """
+    # Pipes, because files may not grow in some of these processes; what is printed fits into them.
+    (out, to_out), (err, to_err) = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        status = 99
+        try:
+            os.dup2(to_out, 1)
+            os.dup2(to_err, 2)
+            sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
+            before()
+            status = main(words)
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(status)
+    os.close(to_out)
+    os.close(to_err)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    texts: list[str] = []
+    for end in (out, err):
+        with open(end, encoding="utf-8") as stream:
+            texts.append(stream.read())
+    return status, texts[0], texts[1]

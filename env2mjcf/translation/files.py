@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -37,7 +38,7 @@ class Written:
 def write_environment(
     environment: Environment, file: PathArgument, *, mesh_dirs: Iterable[PathArgument] = (), inputs: Iterable[str] = ()
 ) -> Written:
-    """Write an environment in its own dialect, each file whole or not at all, the env file last.
+    """Write an environment in its own dialect, all files or none.
 
     Meshes stay where they are: their names are written so that they are found from the new folder.
 
@@ -63,8 +64,10 @@ def write_environment(
         # Dialects B to D begin each configuration with its robot; so must any with several robots.
         plain = environment.dialect in (Dialect.A, Dialect.E) and len(environment.robots) == 1
         texts[query] = query_text(environment.tasks, index=not plain)
-    for path, text in {**texts, out: env_text(placed)}.items():
-        with output(path, "ENV179") as beside:
+    with ExitStack() as written:
+        # All are written before any is renamed, the env file last, as the first that was entered.
+        for path, text in {out: env_text(placed), **texts}.items():
+            beside = written.enter_context(output(path, "ENV179"))
             beside.write_bytes(text.encode("utf-8", "surrogateescape"))
     return Written(out, tuple(names), query, outside, tuple(log))
 
