@@ -50,7 +50,7 @@ def main() -> int:
         if folders.files(out) != kept:
             tally.wrong.append(f"not tidied up: {sorted(folders.files(out) ^ kept)}")
     print(
-        f"kills: {arguments.kills} conversions, {tally.killed} killed ({tally.writing} while writing), "
+        f"kills: {tally.killed} conversions ({tally.writing} while writing), "
         f"{tally.finished} too quick; old scene {tally.old}, new scene {tally.new}; {left} staged files left, "
         f"removed when stale; {len(tally.wrong)} wrong; {time.monotonic() - began:.0f} s"
     )

@@ -44,17 +44,17 @@ def kill_randomly(
         scenes: Two env files.
         references: What they are converted to, under the name "scene".
         out: A folder that holds one of them.
-        kills: How often.
+        kills: How many processes are killed before they have ended.
         seed: Of the moments.
     """
     chance, tally = random.Random(seed), Tally()
     life, writing = _durations(scenes[0], out)
-    for i in range(kills):
+    while tally.killed < kills:
         before = folders.content(out / "scene.xml")
         wanted = 1 - references.index(before)
         known = set(folders.files(out))
         child = _start(scenes[wanted], out)
-        if i % 4 == 0:
+        if (tally.killed + tally.finished) % 4 == 0:
             time.sleep(chance.uniform(0, life))
         else:
             while child.poll() is None and folders.files(out) <= known:
