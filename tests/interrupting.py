@@ -69,7 +69,7 @@ def interrupt(verb: str, folder: Path, after: float, tally: Tally) -> None:
             path.unlink()
     child = subprocess.Popen(
         command, cwd=folder, env=folders.ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-        text=True, start_new_session=True, preexec_fn=_heed,  # noqa: PLW1509
+        text=True, start_new_session=True, preexec_fn=heed,  # noqa: PLW1509
     )  # fmt: skip
     try:
         time.sleep(after)
@@ -109,7 +109,7 @@ def interrupt_randomly(verb: str, folder: Path, count: int, longest: float, seed
     return tally
 
 
-def _heed() -> None:
+def heed() -> None:
     # Jobs in the background inherit that it is ignored.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
