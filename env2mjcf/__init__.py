@@ -5,6 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from . import starting as _starting
+
+if _starting.is_program():
+    _starting.end_at_once()
+
 from .errors import ConversionError as ConversionError
 from .errors import Diagnostic as Diagnostic
 from .errors import Env2MjcfError as Env2MjcfError

@@ -173,6 +173,7 @@ CATALOGUE: dict[str, str] = {
     "MJC421": "A file stands where the output folder should be.",
     "MJC422": "The output cannot be written.",
     "MJC423": "A file that is no MJCF stands where the MJCF would be written; it is kept.",
+    "MJC424": "Another process keeps the output folder locked.",
     # Configurations and queries.
     "CFG501": "Text ends the list of configurations of a query.",
     "CFG502": "A word in a row of configurations is not a finite number.",
@@ -216,4 +217,5 @@ CATALOGUE: dict[str, str] = {
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
     "CFG552": "A picture or film cannot be written.",
+    "CFG553": "A file that is no path stands where a path would be written; it is kept.",
 }

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
+from .. import starting
 from ..errors import Env2MjcfError, did_you_mean
 from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
@@ -63,6 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
+    starting.end_tidily()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         tame_libraries()  # the process is the program's own
@@ -127,6 +129,8 @@ def _run(name: str, verb: Verb) -> int:
     except BrokenPipeError:
         raise
     except Exception as error:
+        if starting.interrupted:
+            return _INTERRUPTED
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
@@ -136,7 +140,9 @@ def _run(name: str, verb: Verb) -> int:
 
 
 def _fault(error: Exception, debug: bool = False) -> int:
-    """Report what should not have happened."""
+    """Report what should not have happened, unless it happened because of Ctrl-C, which libraries turn into others."""
+    if starting.interrupted:
+        return _INTERRUPTED
     _show_traceback(debug)
     notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
     _complain(f"a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} (--debug shows where)")

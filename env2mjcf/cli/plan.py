@@ -17,7 +17,7 @@ from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .configurations import refuse_without_freedom
-from .outputs import refuse_unwritable
+from .outputs import refuse_foreign_path, refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -85,6 +85,8 @@ class Plan:
         if self.out is not None:
             query = () if self.options.query is None else (self.options.query,)
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
+            for file in (Path(self.out), _approach(Path(self.out))):
+                refuse_foreign_path(file)
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
@@ -140,7 +142,7 @@ class Plan:
             return None
         out = Path(self.out)
         if not result.solved:
-            out = out.with_name(f"{out.stem}.approach.path")
+            out = _approach(out)
         q = result.path if self.corners else dense(scene, result)
         return write_path(scene, q, out, robot)
 
@@ -153,6 +155,11 @@ class Plan:
             parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
             parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
         print_parts(parts)
+
+
+def _approach(out: Path) -> Path:
+    """Return where the best approach is written if there is no solution."""
+    return out.with_name(f"{out.stem}.approach.path")
 
 
 def dense(scene: Scene, result: Result) -> np.ndarray:

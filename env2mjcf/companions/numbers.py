@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ConversionError, DiagnosticLog, FormatError, Span
+from ..errors import DiagnosticLog, FormatError, Span
 from ..formats.path import ALL_ROBOTS
 from ..formats.rows import LARGEST
 from ..model import Dialect
@@ -17,7 +17,7 @@ from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..space import ConfigurationSpace
 from ..transforms import Array
-from ..writing import replaced
+from ..writing import output
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -109,15 +109,8 @@ def write(file: PathArgument, text: str) -> Path:
         ConversionError: It cannot be written.
     """
     path = Path(os.fspath(file))
-    try:
-        with replaced(path) as beside:
-            beside.write_bytes(text.encode("utf-8"))
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        DiagnosticLog().fail(
-            ConversionError, "CFG532", str(path), f"{path} cannot be written: {reason}",
-            hint="choose another file; its folder must exist",
-        )  # fmt: skip
+    with output(path, "CFG532") as beside:
+        beside.write_bytes(text.encode("utf-8"))
     return path
 
 

@@ -15,7 +15,7 @@ from ..arguments import positive
 from ..contact.types import Contact
 from ..simulation.scene import Scene
 from ..transforms import Array
-from ..writing import replaced
+from ..writing import output
 from .encoding import encoder
 from .framing import Camera, Viewpoint
 from .marks import TRAIL, Polyline
@@ -85,6 +85,7 @@ def film(
         advance: Called with the number of pictures that are done, and of all.
 
     Raises:
+        ConversionError: The film cannot be written.
         TypeError: A number, or the size, is of a wrong kind.
         ValueError: The path, the file's ending, or a number is not what it should be, or there would be more than
             10,000 pictures.
@@ -107,7 +108,7 @@ def film(
     marks = tuple(_ahead(mark) for mark in trail_marks(scene, path)) if ghosts else ()
     shades = paced(scene, path, _GHOSTS)[0] if ghosts else np.zeros((0, scene.space.dim))
     shot = Shot(scene, frames, (width, height), camera, shades, marks, see_through)
-    with taken(shot) as (answer, stream), replaced(file) as beside:
+    with taken(shot) as (answer, stream), output(file, "CFG552") as beside:
         encode(beside, _pictures(stream, width, height, count, advance), fps)
     return Film(Path(os.fsdecode(file)), q, fps, touching, answer.camera)
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..contact.types import Contact
 from ..simulation.scene import Scene
-from ..writing import replaced
+from ..writing import output
 from .framing import Camera
 from .marks import BAD, Arrows, Mark, Points, Polyline
 from .offscreen import RenderError, read_exactly
@@ -57,6 +57,7 @@ def picture(
         (height, width, 3) uint8, RGB.
 
     Raises:
+        ConversionError: The file cannot be written.
         TypeError: The size or the camera is of a wrong kind.
         ValueError: q, ghosts, trail, size, camera or the file's ending are not what they should be.
         RenderError: It cannot be drawn here, or pillow, which writes files, is not installed.
@@ -104,6 +105,7 @@ def write_png(pixels: NDArray[np.uint8], file: str | os.PathLike[str]) -> None:
     """Write pixels, (height, width, 3) or (height, width, 4), as a PNG file, whole or not at all.
 
     Raises:
+        ConversionError: It cannot be written.
         RenderError: Pillow is not installed.
     """
     try:
@@ -114,5 +116,5 @@ def write_png(pixels: NDArray[np.uint8], file: str | os.PathLike[str]) -> None:
     image = Image.fromarray(pixels).quantize(256, kmeans=1, dither=Image.Dither.FLOYDSTEINBERG)
     buffer = io.BytesIO()
     image.save(buffer, format="PNG", optimize=True)
-    with replaced(file) as beside:
+    with output(file, "CFG552") as beside:
         beside.write_bytes(buffer.getvalue())

@@ -23,7 +23,7 @@ from ..simulation.scene import Scene
 from ..transforms import Array
 from .framing import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
-from .offscreen import drawn
+from .offscreen import RenderError, drawn
 
 # A boundary that is so much larger than all bodies is drawn as far as the picture reaches.
 _FAR_BOUNDARY = 2.0
@@ -123,9 +123,24 @@ def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
     views = _views(shot, points)
     with tempfile.TemporaryDirectory(prefix="env2mjcf-") as folder:
         model = Path(folder) / "scene.mjb"
-        mujoco.mj_saveModel(shot.scene.model, str(model), None)
+        _save(shot.scene.model, model)
         with drawn(_request(shot, views, points, model)) as (head, stream):
             yield Answer(views[head["camera"]], head["see_through"]), stream
+
+
+def _save(model: mujoco.MjModel, file: Path) -> None:
+    """Write a model for the process that draws.
+
+    Raises:
+        RenderError: There is no room for it.
+    """
+    # MuJoCo would only warn, in a log in the current folder.
+    content = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    try:
+        file.write_bytes(content.data)
+    except OSError as error:
+        raise RenderError(f"cannot draw: {file} cannot be written: {error.strerror or error}") from error
 
 
 def _views(shot: Shot, points: Array) -> list[Viewpoint]:

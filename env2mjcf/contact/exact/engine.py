@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,15 @@ def require() -> None:
 def _entries() -> Any:
     # Imported here, because numba takes its time to import, and is an extra.
     with _loading:
-        return import_module(".kernels.entries", __package__)
+        try:
+            return import_module(".kernels.entries", __package__)
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise ValueError(
+                "the exact engine finds no folder to keep what it compiles: name one that may be written with "
+                "NUMBA_CACHE_DIR, or choose engine='mujoco'"
+            ) from error
 
 
 class _Loading:
@@ -82,6 +91,23 @@ if hasattr(os, "register_at_fork"):
     )
 
 
+def _call(entry: Any, *arguments: Any) -> None:
+    """Call a compiled function; if that fails, forget what is kept of it on the disk, and compile it anew.
+
+    Compiled functions raise nothing; what numba has written to the disk may be damaged, and then numba says so in words
+    of its own. It has no checksum, so damage that can still be read is not found.
+    """
+    try:
+        entry(*arguments)
+    except Exception:
+        kept = list(Path(entry.stats.cache_path).glob(f"entries.*.{entry.__name__}-*.nbi"))
+        if not kept:
+            raise
+        for file in kept:
+            file.unlink(missing_ok=True)
+        entry(*arguments)
+
+
 class ExactEngine:
     """Answers for rows of configurations; safe to share between threads.
 
@@ -106,26 +132,30 @@ class ExactEngine:
     def collisions(self, q: Array) -> Bools:
         """Return whether any pair touches, (n,), at configurations (n, dim)."""
         out = np.empty(len(q), dtype=np.bool_)
-        self._collisions(*self._tables, _plain(q), out)
+        # Without a further call: this may be one verdict of less than a microsecond.
+        try:
+            self._collisions(*self._tables, _plain(q), out)
+        except Exception:
+            _call(self._collisions, *self._tables, _plain(q), out)
         return out
 
     def validities(self, q: Array) -> Bools:
         """Return whether configurations are within limits and the boundary, and no pair touches, (n,)."""
         out = np.empty(len(q), dtype=np.bool_)
-        self._entries.validities(*self._tables, _plain(q), out)
+        _call(self._entries.validities, *self._tables, _plain(q), out)
         return out
 
     def distances(self, q: Array) -> Array:
         """Return the least distance of any pair, (n,); inf without pairs, -1 where any touches."""
         out = np.empty(len(q))
-        self._entries.distances(*self._tables, _plain(q), out)
+        _call(self._entries.distances, *self._tables, _plain(q), out)
         return out
 
     def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> Bools:
         """Return whether any pair touches at one of so many steps, (e,), of ways from (e, dim) by (e, dim)."""
         out = np.empty(len(start), dtype=np.bool_)
         start, delta = _plain(start), _plain(delta)
-        self._entries.edges_collide(*self._tables, start, delta, steps, out)
+        _call(self._entries.edges_collide, *self._tables, start, delta, steps, out)
         return out
 
     def edges_are_free(
@@ -144,7 +174,7 @@ class ExactEngine:
         """
         out = np.empty(len(start), dtype=np.bool_)
         start, delta = _plain(start), _plain(delta)
-        self._entries.edges_are_free(*self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
+        _call(self._entries.edges_are_free, *self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
         return out
 
 
@@ -162,9 +192,9 @@ def compile_all() -> float:
     nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
     entries, tables = _entries(), packed(nothing)
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
-    entries.collisions(*tables, rows, answers)
-    entries.validities(*tables, rows, answers)
-    entries.distances(*tables, rows, floats)
-    entries.edges_collide(*tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
-    entries.edges_are_free(*tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
+    _call(entries.collisions, *tables, rows, answers)
+    _call(entries.validities, *tables, rows, answers)
+    _call(entries.distances, *tables, rows, floats)
+    _call(entries.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
+    _call(entries.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start
