@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
 from . import starting as _starting
 
 if _starting.is_program():
     _starting.end_at_once()
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from .errors import ConversionError as ConversionError
 from .errors import Diagnostic as Diagnostic
