@@ -77,12 +77,12 @@ def test_every_model_is_kept(path: Path, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(path, robots=[robot] if robot.exists() else []), tmp_path)
 
 
-@pytest.mark.parametrize("real", real_scenes(), ids=lambda r: r.name)
+@pytest.mark.parametrize("real", real_scenes(), ids=[r.name for r in real_scenes()])
 def test_every_real_scene_is_kept(real: RealScene, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(real.env, **real.keywords), tmp_path)
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", TEXTS, ids=[p.stem for p in TEXTS])
 def test_every_real_text_is_kept(path: Path, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(path), tmp_path)
 
