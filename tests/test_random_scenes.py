@@ -95,7 +95,7 @@ def test_poses_and_verdicts_of_any_scene(
         assert not truth.wrong(row, bool(verdict), 1e-4 * loaded.extent)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(solid=solids())
 def test_mass_is_density_times_volume(tmp_path_factory: pytest.TempPathFactory, solid: Solid) -> None:
     folder = tmp_path_factory.mktemp("scene")
