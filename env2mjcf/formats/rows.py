@@ -16,7 +16,8 @@ _COMMENT = re.compile(r"#|//")
 # Dialect A's InfoCfg wrote three numbers behind some configurations.
 _LEGACY_INFO_FIELDS = 3
 # Larger numbers overflow as soon as they are squared.
-_LARGEST = 1e100
+LARGEST = 1e100
+"""The largest number of a configuration."""
 
 
 class Extra(StrEnum):
@@ -55,13 +56,13 @@ class Line:
 def coordinate(word: str) -> float | None:
     """Return the number that a word is; None where it is none, or no length or angle that can be computed with."""
     value = parse_number(word)
-    return value if value is not None and abs(value) <= _LARGEST else None
+    return value if value is not None and abs(value) <= LARGEST else None
 
 
 def coordinate_hint(word: str) -> str:
     """Return what to do about a word that is no coordinate; empty where it does not look like a number."""
     too_large = parse_number(word) is not None and coordinate(word) is None
-    return f"numbers must not be larger than {_LARGEST:g}" if too_large else number_hint(word)
+    return f"numbers must not be larger than {LARGEST:g}" if too_large else number_hint(word)
 
 
 def split_row(numbers: Sequence[float], dofs: Sequence[int]) -> tuple[int, tuple[float, ...]] | None:
