@@ -4,6 +4,8 @@
 PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PYTEST_FLAGS ?=
+# What the README and docs/tutorial.md go on with after the demo.
+DEMO_EXTRAS := fast,view,planning
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
@@ -14,7 +16,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 18
 
-demo: $(VENV)/view.stamp  ## convert the seed scene, let it fall, report contacts, draw a picture
+demo: $(VENV)/demo.stamp  ## convert the seed scene, let it fall, report contacts, draw a picture
 	@$(BIN)/python models/demo.py
 
 test: $(VENV)/dev.stamp  ## run the tests; PYTEST_FLAGS="-k alpha" picks some
@@ -47,15 +49,15 @@ clean:  ## remove what was built, .venv included
 	rm -rf $(VENV) build dist demo docs/_build .pytest_cache .ruff_cache .hypothesis
 
 # A stamp is written last, so that an interrupted installation is taken up again.
-$(VENV)/view.stamp: pyproject.toml
-	$(call install,view)
+$(VENV)/demo.stamp: pyproject.toml
+	$(call install,$(DEMO_EXTRAS))
 	@touch $@
 
 $(VENV)/dev.stamp: pyproject.toml
 	$(call install,dev)
 	@echo "compiling the exact engine, once" >&2
 	@$(BIN)/env2mjcf cache warm >&2
-	@touch $(VENV)/view.stamp $@
+	@touch $(VENV)/demo.stamp $@
 
 define install
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed: none of python3.11, python3 is" >&2; exit 1; }

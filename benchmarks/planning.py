@@ -137,9 +137,9 @@ def text(rows: Sequence[Row], command: str, seconds: float, load_share: float) -
             f"{STEP:g} of the extent from one to the next, and how many of them touch by python-fcl's triangles and "
             "containment.",
             "",
-            "Published: what the authors of the scenes give for their own planner (a roadmap; RRT for ZTunnel) on "
-            "other hardware. Compare counts first, and times only in their order of magnitude. Their collision calls, "
-            "and our checks, are of whole configurations; their path had neither to be short nor proved.",
+            "Published: what the authors of the scenes give for their own planner (RRT for ZTunnel) on other hardware. "
+            "Compare counts first, and times only in their order of magnitude. A check of ours is a whole "
+            "configuration; what a call of theirs is may differ.",
             "",
             f"**{sum(r.solved for r in rows)} of {len(rows)} scenes solved, {sum(r.solved for r in named)} of the "
             f"{len(named)} with published figures; {sum(r.touching for r in rows)} of {total:,} configurations on "

@@ -82,9 +82,6 @@ def with_site_links(text: str, folder: PurePosixPath) -> str:
 def on_source(app: Sphinx, docname: str, content: list[str]) -> None:
     """Put in what is generated, and turn links to files of the checkout into links to pages."""
     text = with_site_links(content[0], PurePosixPath("docs", docname).parent)
-    # A page of another feature, which may not be here yet.
-    beside = (HERE / docname).parent
-    text = re.sub(r"^\?(\w+)$", lambda m: m[1] if (beside / f"{m[1]}.md").exists() else "", text, flags=re.MULTILINE)
     content[0] = re.sub(r"^<!-- generated: (\w+) -->$", lambda m: generated.PARTS[m[1]](), text, flags=re.MULTILINE)
 
 

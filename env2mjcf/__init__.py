@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from .simulation.scene import Query as Query
     from .simulation.scene import Scene as Scene
     from .space import ConfigurationSpace as ConfigurationSpace
+    from .translation import Translation as Translation
+    from .translation import translate as translate
+    from .translation import write_environment as write_environment
 
 # These need MuJoCo, which reading does not: they are imported when they are first used.
 _LAZY = {
@@ -59,6 +62,9 @@ _LAZY = {
     "Query": ".simulation.scene",
     "Scene": ".simulation.scene",
     "ConfigurationSpace": ".space",
+    "Translation": ".translation",
+    "translate": ".translation",
+    "write_environment": ".translation",
 }
 
 _byu.register()

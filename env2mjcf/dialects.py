@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from .model import DHForm, Dialect, Recentring
+from .model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
 
 
 class JointOrder(StrEnum):
@@ -89,4 +89,108 @@ RULES: dict[Dialect, DialectRules] = {
     Dialect.C: _later(JointOrder.FILE, DHForm.CRAIG, plural=False),
     Dialect.D: _later(JointOrder.FILE, DHForm.CRAIG, plural=True),
     Dialect.E: _later(JointOrder.PARENT_CHILD, DHForm.STANDARD, plural=True),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """What the original reader of a dialect takes, beyond meshes, poses and connections.
+
+    Attributes:
+        boundaries: Shapes of a boundary; none where the file has no boundary.
+        brackets: Whether the boundary stands in brackets.
+        resolution: Fields of `Resolution`.
+        kinds: Multibodies of an environment file; robots of dialect E have files of their own.
+        bases: How bodies are carried.
+        joints: Types of joints.
+        limits: Whether joints have limits.
+        options: Whether bodies have options: recentring, colour, texture.
+        mass: Whether a robot's bodies have masses.
+        adjacencies: Whether robots have `Adjacencies`.
+        robot_files: Whether each robot has a file of its own.
+        legacy_bodies: Whether obstacles may have many bodies, and a free base has a pose.
+    """
+
+    boundaries: frozenset[BoundaryShape]
+    brackets: bool
+    resolution: tuple[str, ...]
+    kinds: frozenset[MultiBodyKind]
+    bases: frozenset[BaseKind]
+    joints: frozenset[JointType]
+    limits: bool
+    options: bool
+    mass: bool
+    adjacencies: bool
+    robot_files: bool = False
+    legacy_bodies: bool = False
+
+
+_LATER_JOINTS = frozenset({JointType.REVOLUTE, JointType.SPHERICAL, JointType.NON_ACTUATED})
+_OBSTACLES = frozenset({MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL})
+_LATER_KINDS = _OBSTACLES | {MultiBodyKind.ACTIVE, MultiBodyKind.SURFACE}
+_ALL_BASES = frozenset(BaseKind)
+
+VOCABULARIES: dict[Dialect, Vocabulary] = {
+    Dialect.A: Vocabulary(
+        boundaries=frozenset(),
+        brackets=False,
+        resolution=(),
+        kinds=_OBSTACLES | {MultiBodyKind.ACTIVE},
+        bases=frozenset({BaseKind.VOLUMETRIC_ROTATIONAL, BaseKind.FIXED, BaseKind.JOINT}),
+        joints=frozenset({JointType.REVOLUTE, JointType.PRISMATIC}),
+        limits=False,
+        options=False,
+        mass=False,
+        adjacencies=False,
+        legacy_bodies=True,
+    ),
+    Dialect.B: Vocabulary(
+        boundaries=frozenset(),
+        brackets=False,
+        resolution=(),
+        kinds=_LATER_KINDS,
+        bases=_ALL_BASES,
+        joints=_LATER_JOINTS,
+        limits=False,
+        options=False,
+        mass=False,
+        adjacencies=False,
+    ),
+    Dialect.C: Vocabulary(
+        boundaries=frozenset({BoundaryShape.BOX, BoundaryShape.SPHERE}),
+        brackets=False,
+        resolution=(),
+        kinds=frozenset(MultiBodyKind),
+        bases=_ALL_BASES,
+        joints=_LATER_JOINTS | {JointType.SMA},
+        limits=True,
+        options=False,
+        mass=False,
+        adjacencies=False,
+    ),
+    Dialect.D: Vocabulary(
+        boundaries=frozenset(BoundaryShape),
+        brackets=True,
+        resolution=("position", "position_factor", "orientation", "time", "rd"),
+        kinds=frozenset(MultiBodyKind),
+        bases=_ALL_BASES,
+        joints=_LATER_JOINTS | {JointType.SMA},
+        limits=True,
+        options=True,
+        mass=True,
+        adjacencies=True,
+    ),
+    Dialect.E: Vocabulary(
+        boundaries=frozenset(BoundaryShape),
+        brackets=True,
+        resolution=("position", "orientation", "time"),
+        kinds=_OBSTACLES,
+        bases=_ALL_BASES,
+        joints=_LATER_JOINTS,
+        limits=True,
+        options=True,
+        mass=False,
+        adjacencies=True,
+        robot_files=True,
+    ),
 }

@@ -298,3 +298,16 @@ def test_no_slip_of_the_pen_is_more_than_a_refusal(tmp_path: Path, kind: str) ->
             continue
         for part in found if isinstance(found, tuple) else (found,):
             assert np.isfinite(part.q).all()
+
+
+def test_files_of_the_time_of_turns_are_read_in_turns_whatever_the_scene_is_written_in(tmp_path: Path) -> None:
+    scene = load(tmp_path, SCENES["D"])
+    (tmp_path / "x.path").write_text("VIZMO_PATH_FILE   Path Version 20001125\n1\n1\n1 2 3 0 0 0.25\n")
+    found = env2mjcf.read_path(scene, tmp_path / "x.path")
+    np.testing.assert_allclose(found.q, [[1, 2, 3, 0, 0, np.pi / 2]])
+    assert [d.code for d in found.diagnostics] == ["CFG535"]
+    head = "Roadmap Version Number 061300\n#####GRAPHSTART#####\n1 0 1\n"
+    (tmp_path / "x.map").write_text(f"{head}0 1 2 3 0 0 0.25 -1 -1 -1 0\n#####GRAPHSTOP#####\n")
+    found_map = env2mjcf.read_roadmap(scene, tmp_path / "x.map")
+    np.testing.assert_allclose(found_map.q, [[1, 2, 3, 0, 0, np.pi / 2]])
+    assert [d.code for d in found_map.diagnostics] == ["CFG535"]

@@ -40,7 +40,7 @@ def decoded(file: Path) -> tuple[dict, list[np.ndarray]]:
 
 def blue(picture: np.ndarray) -> np.ndarray:
     """Return the corners (x, y) of the box around what has a robot's blue, (2, 2)."""
-    found = np.argwhere(picture[..., 2] - picture[..., 0] > 50)[:, ::-1]
+    found = np.argwhere(picture[..., 2] > 1.4 * picture[..., 0] + 10)[:, ::-1]
     return np.array([found.min(axis=0), found.max(axis=0) + 1])
 
 
@@ -189,6 +189,20 @@ def test_render_refuses_what_it_cannot_do(words: tuple[str, ...], message: str, 
     shown = run("render", "scene.env", *words, folder=tmp_path)
     assert (shown.returncode, shown.stdout) == (2, "")
     assert message in shown.stderr
+
+
+@pytest.mark.parametrize("words", [("render",), ("play", "a.path"), ("check", "a.path")])
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
+    cubes: env2mjcf.Scene, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    write_scene(tmp_path, free_cube())
+    write_path(cubes, PATH[:2], tmp_path / "a.path")
+    verb, *rest = words
+    out = {"render": ("-o", "none/a.png"), "play": ("-o", "none/a.mp4"), "check": ("--picture", "none/a.png")}[verb]
+    shown = run(verb, "scene.env", *rest, *out, folder=tmp_path)
+    assert (shown.returncode, shown.stdout) == (3, "")
+    assert "error CFG552: none/a." in shown.stderr
+    assert "lies in none, which is no folder" in shown.stderr
 
 
 def test_without_gl_render_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

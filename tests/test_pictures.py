@@ -52,9 +52,11 @@ def everything_is_in_view(scene: env2mjcf.Scene, q: np.ndarray | None) -> None:
         rest -= visible
         if not rest:
             return
-        assert visible, f"not in the picture: {sorted(rest)}"
+        # A link of a long thin chain may be smaller than a pixel of the usual size.
+        assert visible or seen.labels.shape == (480, 640), f"not in the picture: {sorted(rest)}"
         # What hides them is taken away.
-        seen = segmentation(scene, q, size=(640, 480), camera=seen.camera, only=rest)
+        size = (640, 480) if visible else (2560, 1920)
+        seen = segmentation(scene, q, size=size, camera=seen.camera, only=rest)
 
 
 @needs_gl
@@ -70,7 +72,8 @@ def test_every_scene_of_ours_is_in_view(name: str) -> None:
 @pytest.mark.parametrize("name", scene_names())
 def test_every_real_scene_is_in_view(name: str) -> None:
     row = real_scene(name)
-    scene = env2mjcf.load(row.env, **row.keywords, query=row.query)
+    # A few environments lack the robot that their query is for.
+    scene = env2mjcf.load(row.env, **row.keywords, query=row.query if row.dof else None)
     everything_is_in_view(scene, scene.queries[0].q[0] if scene.queries else None)
 
 

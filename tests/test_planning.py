@@ -22,6 +22,7 @@ pytest.importorskip("ompl")
 
 from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
 from env2mjcf.planning.bridge import state_space
+from env2mjcf.planning.result import Progress
 from env2mjcf.planning.shortening import shortened
 from env2mjcf.planning.space import PlanningSpace
 from env2mjcf.planning.validity import Validity
@@ -179,6 +180,26 @@ def test_motions_are_looked_at_everywhere_and_every_look_counts(maze: env2mjcf.S
         assert validity.motions == 1
 
 
+def test_many_motions_are_judged_as_each_of_them_is(maze: env2mjcf.Scene):
+    space = space_of(maze)
+    rows = space.draw(600, np.random.default_rng(2))
+    rows = rows[maze.is_valid(rows)][:200]
+    starts, ends = rows, space.enforced(rows + np.random.default_rng(3).normal(scale=0.3, size=rows.shape))
+    together, alone = (Validity(maze, space, 0.05) for _ in range(2))
+    verdicts = together.free(starts, ends)
+    assert verdicts.tolist() == [alone.motion(a, b) for a, b in zip(starts, ends, strict=True)]
+    assert 20 < verdicts.sum() < 180
+    assert together.motions == alone.motions == 200
+
+
+def test_the_bug_gets_out_of_its_bottle():
+    scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
+    start, goal = scene.queries[0].q
+    found = plan(scene, start, goal, planner="BatchEST", time=60)
+    assert_leads(scene, found, start, goal)
+    assert_free_by_triangles(scene, found.path, 0.01)
+
+
 def test_what_stays_does_not_move():
     scene = env2mjcf.load(MODELS / "two-robots/two-robots.env", query=MODELS / "two-robots/two-robots.query")
     query = scene.queries[1]
@@ -195,6 +216,7 @@ def test_the_maze_is_solved_and_triangles_agree(maze: env2mjcf.Scene):
     query = maze.queries[0]
     found = plan(maze, query.q[0], query.q[-1], time=60)
     assert_leads(maze, found, query.q[0], query.q[-1])
+    assert found.planner in ("RRTConnect", "BatchEST")
     assert found.certified.all()
     assert maze.edge_is_free(found.path[:-1], found.path[1:]).all()
     assert found.length == pytest.approx(space_of(maze).path_length(found.path))
@@ -242,6 +264,19 @@ def test_without_a_solution_the_best_approach_is_told(room: Path):
         assert_free_by_triangles(scene, found.path, 0.05)
 
 
+@pytest.mark.parametrize("planner", ["RRTConnect", "PRM", "KPIECE", "BatchEST"])
+def test_what_is_raised_while_planning_comes_out(planner: str, room: Path):
+    scene = env2mjcf.load(room / "shut.env", query=room / "cross.query")
+    start, goal = scene.queries[0].q
+
+    def interrupt(progress: Progress) -> None:
+        if progress.motions:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan(scene, start, goal, planner=planner, time=20, progress=interrupt)
+
+
 def test_thin_walls_are_not_passed_over(tmp_path: Path):
     # The steps are longer than the wall and the robot together: most motions step over it.
     (tmp_path / "cube.g").write_text(CUBE)
@@ -281,7 +316,7 @@ def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):
     [
         ({"goal": [0.3, 0, 0]}, r"the goal is not valid: cube and cube_2 \(obstacle\)"),
         ({"start": [-3.9, 0, 0]}, r"the start is not valid: outside: cube"),
-        ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT\)"),
+        ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT, BatchEST\)"),
         ({"robot": 1}, "there is no robot 1; the scene has 1"),
         ({"time": 0}, "time is 0"),
         ({"seed": -1}, "seed is -1"),
@@ -298,12 +333,21 @@ def test_what_cannot_be_planned_is_said(arguments: dict[str, Any], message: str,
 # The verb.
 
 
+def test_the_help_and_the_documentation_name_every_planner():
+    from env2mjcf.cli.plan import Plan as Verb
+
+    page = (MODELS.parent / "docs" / "planning.md").read_text(encoding="utf-8")
+    for name in PLANNERS:
+        assert re.search(rf"\b{name}\b", Verb.__doc__ or "")
+        assert f"`{name}`" in page
+
+
 def rows_of(path: Path) -> np.ndarray:
-    """The configurations of a path file, read as its format says."""
+    """The configurations of a path file, read as its format says; of three numbers, behind the robot's index if any."""
     header, links, count, *rows = path.read_text().splitlines()
     assert re.fullmatch(r"VIZMO_PATH_FILE   Path Version \d+", header)
     assert (links, int(count)) == ("1", len(rows))
-    return np.array([[float(x) for x in row.split()] for row in rows])
+    return np.array([[float(x) for x in row.split()[-3:]] for row in rows])
 
 
 def test_a_path_is_written_and_leads_from_start_to_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -351,7 +395,7 @@ def test_without_a_solution_the_status_is_1_and_the_approach_is_written(room: Pa
     words = ["plan", str(room / "shut.env"), "--query", str(room / "cross.query"), "--time", "0.5"]
     assert main([*words, "-o", str(room / "shut.path")]) == 1
     shown = capsys.readouterr().out
-    assert "not solved by auto" in shown
+    assert "not solved by RRTConnect and BatchEST" in shown
     assert "left to the goal: " in shown
     assert not (room / "shut.path").exists()
     assert rows_of(room / "shut.approach.path")[0].tolist() == [-2, 0, 0]

@@ -25,6 +25,7 @@ from .judgements import (
     pose_summary,
     verdict_lines,
 )
+from .outputs import refuse_unwritable
 from .printing import print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -88,6 +89,8 @@ class Check:
 
         if self.picture is not None and not self.picture.lower().endswith(".png"):
             raise ValueError(f"--picture is {self.picture}; expected a file that ends in .png")
+        if self.picture is not None:
+            refuse_unwritable(self.picture, "CFG552")
         if self.configurations and self.options.query is not None:
             raise ValueError("configurations are given twice: behind the scene and with --query")
         options = dataclasses.replace(self.options, query=None)

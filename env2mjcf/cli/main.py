@@ -30,6 +30,7 @@ VERBS = {
     "play": ("play", "Play", "film robots that follow a path"),
     "view": ("view", "View", "show a scene on a web page: sliders, live contacts, paths that play"),
     "plan": ("plan", "Plan", "find a way from start to goal, prove it, and write it as a path"),
+    "translate": ("translate", "Translate", "write a scene in another dialect of the format"),
     "cache": ("cache", "Cache", "say what the geometry cache holds, or empty it"),
 }
 
@@ -48,6 +49,7 @@ examples:
   env2mjcf view scene.env                         a page with sliders
   env2mjcf plan scene.env --query scene.query     a way from start to goal
   env2mjcf lint scenes/                           what is doubtful in a folder
+  env2mjcf translate scene.env -o new.env --dialect D
   env2mjcf convert --help                         all options of a verb
 
 exit status: 0 done, free or valid; 1 a finding (collision, invalid configuration, lint error); 2 wrong usage;

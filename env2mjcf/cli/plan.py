@@ -13,9 +13,10 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import ConversionError, DiagnosticLog, FormatError
+from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -36,8 +37,9 @@ class Plan:
     goal, is written beside the output: out.approach.path for out.path. A start or goal that is not valid is a finding,
     too: it is said who touches, and nothing is written.
 
-    Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT. All are OMPL's.
-    auto takes turns: RRTConnect and KPIECE. RRTstar and PRMstar use all of the time.
+    Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT (all of OMPL) and
+    BatchEST (ours: trees that grow by small changes, for narrow places). auto lets RRTConnect and BatchEST take turns.
+    RRTstar and PRMstar use all of the time.
 
     Examples:
       env2mjcf plan maze.env --robots maze.robot --query maze.query -o maze.path
@@ -78,7 +80,9 @@ class Plan:
         from ..simulation.preparing import load
 
         known(self.planner)
-        _refuse(self.out)
+        if self.out is not None:
+            query = () if self.options.query is None else (self.options.query,)
+            refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
@@ -145,18 +149,6 @@ class Plan:
             parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
             parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
         print_parts(parts)
-
-
-def _refuse(out: PathArgument | None) -> None:
-    """Refuse what cannot be written before time is spent on it."""
-    if out is None:
-        return
-    path = Path(out)
-    if path.is_dir() or not path.parent.is_dir():
-        what = "is a folder" if path.is_dir() else f"lies in {path.parent}, which is no folder"
-        DiagnosticLog().fail(
-            ConversionError, "CFG542", str(path), f"{path} {what}; expected a file to write", hint="name another output"
-        )
 
 
 def dense(scene: Scene, result: Result) -> np.ndarray:

@@ -18,6 +18,7 @@ from ..errors import DiagnosticLog
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .cameras import camera_of, size_of
+from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -72,10 +73,13 @@ class Play:
     def run(self) -> int:
         """Write the film, and say what touches in it."""
         from ..simulation.preparing import load
+        from ..view.encoding import encoder
         from ..view.films import film
         from .configurations import of_file
 
         camera, size = camera_of(self.camera), size_of(self.size)
+        encoder(self.out)
+        refuse_unwritable(self.out, "CFG552")
         options = dataclasses.replace(self.options, query=None)
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(options))

@@ -14,6 +14,7 @@ from ..errors import DiagnosticLog
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .cameras import camera_of, size_of
+from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class Render:
         if not self.out.lower().endswith(".png"):
             raise ValueError(f"--out is {self.out}; expected a file that ends in .png")
         camera, size = camera_of(self.camera), size_of(self.size)
+        refuse_unwritable(self.out, "CFG552")
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)

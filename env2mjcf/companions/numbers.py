@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ConversionError, DiagnosticLog
+from ..errors import ConversionError, DiagnosticLog, FormatError, Span
 from ..formats.path import ALL_ROBOTS
 from ..model import Dialect
 from ..options import PathArgument
@@ -35,6 +35,31 @@ def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) ->
         numbers[:, columns] = [rows[i][1] for i in own]
         q[own, columns] = space.decode(numbers)[:, columns]
     return q
+
+
+def out_of_turns(
+    scene: Scene, rows: Sequence[tuple[int, Sequence[float]]], file: str, span: Span, log: DiagnosticLog
+) -> list[tuple[int, Sequence[float]]]:
+    """Return rows of dialect A's time, whose angles are turns, in the units of the scene's dialect.
+
+    Args:
+        scene: Whose configurations they are.
+        rows: Rows (robot, its numbers in the file).
+        file: Name of the file.
+        span: Where it tells its age.
+        log: Where findings go.
+    """
+    if scene.environment.dialect is Dialect.A or not rows:
+        return list(rows)
+    log.warn(
+        FormatError, "CFG535", file,
+        "a file of this version counts angles in turns, the scene's dialect in fractions of pi; read as turns",
+        hint="is it the file of an older version of the scene?", span=span,
+    )  # fmt: skip
+    robots = scene.compiled.assembly.robots
+    factors = {i: [1.0 if d.kind.is_length else 2.0 for d in r.kinematics.dofs] for i, r in enumerate(robots)}
+    factors[ALL_ROBOTS] = [f for i in range(len(robots)) for f in factors[i]]
+    return [(r, [x * f for x, f in zip(row, factors[r], strict=True)]) for r, row in rows]
 
 
 def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from ..model import BaseKind, Dialect
 from ..options import Limits, PathArgument
 from ..simulation.scene import Scene
 from ..transforms import Array, rotation_matrix, transform
-from .numbers import configurations, dofs_of, file_numbers, write, written_index
+from .numbers import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832
@@ -86,7 +87,10 @@ def path_record(scene: Scene, source: Source, log: DiagnosticLog) -> PathRecord:
     lines = np.array(found.lines, dtype=np.int64)
     if found.poses is not None:
         return _of_poses(scene, source, found, found.poses, log)
-    q = configurations(scene, [(row.robot, row.configuration) for row in found.rows])
+    rows: list[tuple[int, Sequence[float]]] = [(row.robot, row.configuration) for row in found.rows]
+    if found.version in text.OF_TURNS:
+        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
+    q = configurations(scene, rows)
     robots = np.array([row.robot for row in found.rows], dtype=np.int64)
     none = np.zeros(len(q))
     return PathRecord(source.path, found.version, q, robots, lines, None, none, none == 0, tuple(log))

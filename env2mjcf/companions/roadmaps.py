@@ -18,9 +18,10 @@ from ..options import Limits, PathArgument
 from ..simulation.scene import Scene
 from ..transforms import Array
 from .adjacency import undirected
-from .numbers import configurations, dofs_of, file_numbers, write, written_index
+from .numbers import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
 
 Indices = NDArray[np.int64]
+Rows = list[tuple[int, Sequence[float]]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,13 +132,15 @@ def roadmap_record(scene: Scene, source: Source, log: DiagnosticLog) -> Roadmap:
     if found.dropped:
         log.info("CFG531", source.path, f"{found.dropped} are not used")
     nodes = found.nodes
-    q = configurations(scene, [(n.robot, n.configuration) for n in nodes])
+    rows: Rows = [(n.robot, n.configuration) for n in nodes]
     kept = undirected(source, nodes, log)
     robots = np.array([n.robot for n in nodes], dtype=np.int64)
     edges = np.array([pair for pair, _ in kept], dtype=np.int64).reshape(-1, 2)
-    between = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
+    between: Rows = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
+    if found.header.of_turns:
+        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
     stops = np.cumsum([0, *(len(edge.intermediates) for _, edge in kept)])
-    corners = configurations(scene, between)
+    q, corners = configurations(scene, rows), configurations(scene, between)
     info = np.array([(*n.info, *[np.nan] * (3 - len(n.info))) for n in nodes], dtype=np.float64).reshape(-1, 3)
     return Roadmap(
         q,

@@ -22,7 +22,9 @@ CURRENT, TURNS = 2012, 20001125
 
 _LINK_POSES = 20001022
 # 20001025 is what dialect A's source calls legacy.
-_KNOWN = (_LINK_POSES, 20001025, TURNS, CURRENT)
+OF_TURNS = (_LINK_POSES, 20001025, TURNS)
+"""Versions of dialect A's time, which counts angles in turns."""
+_KNOWN = (*OF_TURNS, CURRENT)
 _HEADER = "VIZMO_PATH_FILE   Path Version"
 _HEADER_WORDS = re.compile(r"\s*VIZMO_PATH_FILE\s+Path\s+Version\s+([0-9]{1,9})\s*", re.IGNORECASE)
 _WORD = re.compile(r"\S+")

@@ -30,6 +30,7 @@ class RoadmapHeader:
         preamble: The command that made it.
         local_planners, collision_detectors, distance_metrics: A line each.
         seed: Of the random numbers.
+        of_turns: Whether it is of dialect A's time, which counts angles in turns.
     """
 
     version: str = ""
@@ -39,6 +40,7 @@ class RoadmapHeader:
     collision_detectors: tuple[str, ...] = ()
     distance_metrics: tuple[str, ...] = ()
     seed: str = ""
+    of_turns: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +137,7 @@ def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
 
     return RoadmapHeader(
         version[3] if version else "", text("ENVFILE"), text("PREAMBLE"), lines("LP"), lines("CD"), lines("DM"),
-        text("RNGSEED"),
+        text("RNGSEED"), version is not None and not version[1],
     )  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -85,26 +86,54 @@ def state_space(space: PlanningSpace) -> tuple[Any, _Layout]:
 
 
 class _Motions(base.MotionValidator):
-    """Answers about motions, and about states for who asks for those."""
+    """Answers about motions, and about states for who asks for those, until there is a reason to stop.
+
+    Nothing is raised through OMPL, whose PRM could not clean up behind it (Ctrl-C would end in an abort): an error is
+    kept for later, and planning stopped.
+    """
 
     def __init__(self, information: Any, read: Callable[[Any], Array], validity: Validity) -> None:
         super().__init__(information)
         self._read, self._validity = read, validity
-        self.poll: Callable[[], None] = _nothing
+        self._stop: Callable[[], bool] = _never
+        self._terminate: Callable[[], None] | None = None
+        self._error: BaseException | None = None
 
     def checkMotion(self, start: Any, end: Any, *_: Any) -> bool:
         """Return whether a motion is valid."""
-        self.poll()
-        return self._validity.motion(self._read(start), self._read(end))
+        return self._answer(lambda: self._validity.motion(self._read(start), self._read(end)))
 
     def is_valid(self, state: Any) -> bool:
         """Return whether a state is valid."""
-        self.poll()
-        return bool(self._validity.states(self._read(state)[None])[0])
+        return self._answer(lambda: bool(self._validity.states(self._read(state)[None])[0]))
+
+    @contextmanager
+    def until(self, stop: Callable[[], bool], terminate: Callable[[], None]) -> Generator[None]:
+        """Call `terminate` when `stop` says so, or when something is wrong; raise then what is wrong."""
+        self._stop, self._terminate = stop, terminate
+        try:
+            yield
+        finally:
+            self._stop, self._terminate = _never, None
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+
+    def _answer(self, question: Callable[[], bool]) -> bool:
+        try:
+            if self._stop() and self._terminate is not None:
+                self._terminate()
+            return self._error is None and question()
+        except BaseException as error:
+            if self._terminate is None:
+                raise
+            self._error = self._error or error
+            self._terminate()
+            return False
 
 
-def _nothing() -> None:
-    pass
+def _never() -> bool:
+    return False
 
 
 class OmplRun:
@@ -122,7 +151,7 @@ class OmplRun:
     def __init__(
         self, space: PlanningSpace, validity: Validity, planner: str, start: Array, goal: Array, seed: int
     ) -> None:
-        self.validity = validity
+        self.name, self.validity = planner, validity
         util.setLogLevel(util.LOG_NONE)
         # Zero is no seed for OMPL.
         util.RNG.setSeed(seed + 1)
@@ -149,16 +178,8 @@ class OmplRun:
         # The condition itself must not be Python code: PRM asks it in a thread of its own, and would wait forever for
         # the one that is in here. Whoever asks for a verdict looks at the clock instead.
         condition = base.plannerNonTerminatingCondition()
-
-        def poll() -> None:
-            if stop():
-                condition.terminate()
-
-        self._motions.poll = poll
-        try:
+        with self._motions.until(stop, condition.terminate):
             self._planner.solve(condition)
-        finally:
-            self._motions.poll = _nothing
         return self._problem.hasExactSolution()
 
     def path(self) -> Array | None:

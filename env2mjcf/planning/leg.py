@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from ..simulation.scene import Scene
 from ..transforms import Array
-from .names import AUTO, OPTIMISING
+from .expanding import ExpandingRun
+from .names import AUTO, BATCH, OPTIMISING
 from .shortening import shortened
 from .space import PlanningSpace
-from .turns import Run, Turns
+from .turns import Counted, Run, Turns
 from .validity import Validity
 from .watch import Watch
 
@@ -23,6 +24,8 @@ from .watch import Watch
 _FINER = 50
 # A solution that passes over something is mended with steps this much finer, for this long; else planned anew.
 _MENDING, _MENDING_SECONDS = 8, 3.0
+# Before that it is tried to nudge it, from this far to that far, in extents, and so many times.
+_NUDGES = (1e-4, 5e-2, 150)
 # Short cuts that are tried, and for how long at most.
 _CUTS, _CUTTING_SECONDS = 300, 5.0
 # The part of what time is left that planners get which always take all.
@@ -31,9 +34,10 @@ _OPTIMISING = 0.7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LegResult:
-    """The way of one leg, (k, d), in the fields of `Plan`."""
+    """The way of one leg, (k, d), in the words of `Plan`."""
 
     solved: bool
+    planner: str
     path: Array
     certified: NDArray[np.bool_]
     dense: NDArray[np.bool_]
@@ -67,6 +71,8 @@ class Leg:
     ) -> None:
         self._scene, self._space, self._planner = scene, space, planner
         self._resolution, self._seeds, self._watch, self._shorten = resolution, seeds, watch, shorten
+        # Who has found, or looked for, the path; not for the details of mending it.
+        self._by = planner
         self._fine = watch.counts(Validity(scene, space, resolution / _FINER))
 
     def plan(self, start: Array, goal: Array) -> LegResult:
@@ -74,7 +80,9 @@ class Leg:
         resolution, best = self._resolution, np.stack([start])
         while not self._watch.stop():
             self._watch.doing = "planning"
-            found, way = self._search(self._planner, start, goal, resolution, self._patience())
+            run = self._run(self._planner, start, goal, resolution)
+            found, way = _searched(run, start, goal, self._patience())
+            self._by = run.name
             if found is None:
                 best = min(best, way, key=lambda p: self._space.distance(p[-1], goal))
                 break
@@ -90,43 +98,57 @@ class Leg:
             return self._watch.stop_within(_OPTIMISING * self._watch.left)
         return self._watch.stop
 
-    def _search(
-        self, planner: str, start: Array, goal: Array, resolution: float, stop: Callable[[], bool]
-    ) -> tuple[Array | None, Array]:
-        """Return a path or None, and the way to what came nearest."""
+    def _run(self, planner: str, start: Array, goal: Array, resolution: float) -> Run:
         seed = int(self._seeds.spawn(1)[0].generate_state(1)[0] >> 1)
-        runs: list[Run] = []
+        runs: list[Counted] = []
         for name in AUTO if planner == "auto" else (planner,):
             validity = self._watch.counts(Validity(self._scene, self._space, resolution))
             runs.append(_run(name, self._space, validity, start, goal, seed))
-        run = runs[0] if len(runs) == 1 else Turns(runs, self._space, goal)
-        found = run.solve(stop)
-        path = run.path()
-        if path is None:
-            return None, np.stack([start])
-        # The very numbers of start and goal, which on circles may be whole turns away.
-        path[0] = start
-        if found:
-            path[-1] = goal
-        return (path, path) if found else (None, path)
+        return runs[0] if len(runs) == 1 else Turns(runs, self._space, goal)
 
     def _mended(self, path: Array, resolution: float) -> Array | None:
-        """Return the path with a detour where an edge is not good; None where there is no quick one."""
+        """Return the path with detours where edges are not good; None where there is no quick one."""
         self._watch.doing = "proving"
-        pieces = [path[:1]]
-        for a, b in pairwise(path):
-            if self._good(a, b):
-                pieces.append(b[None])
-                continue
-            stop = self._watch.stop_within(_MENDING_SECONDS)
-            detour, _ = self._search("RRTConnect", a, b, resolution / _MENDING, stop)
-            if detour is not None and all(map(self._good, detour[:-1], detour[1:])):
-                pieces.append(detour[1:])
-            elif self._fine.motion(a, b):
-                pieces.append(b[None])
-            else:
+        good = [self._good(a, b) for a, b in pairwise(path)]
+        pieces, first = [path[:1]], 0
+        while first < len(good):
+            last = first + 1
+            while not good[first] and last < len(good) and not good[last]:
+                last += 1
+            stretch = path[first : last + 1] if good[first] else self._detour(path[first : last + 1], resolution)
+            if stretch is None:
                 return None
+            pieces.append(stretch[1:])
+            first = last
         return np.concatenate(pieces)
+
+    def _detour(self, stretch: Array, resolution: float) -> Array | None:
+        """Return a way between the ends of edges that are not good; the edges where they are valid, yet not proved."""
+        nudged = self._nudged(stretch)
+        if nudged is not None:
+            return nudged
+        start, goal = stretch[0], stretch[-1]
+        run = self._run("RRTConnect", start, goal, resolution / _MENDING)
+        found, _ = _searched(run, start, goal, self._watch.stop_within(_MENDING_SECONDS))
+        if found is not None and all(self._good(a, b) for a, b in pairwise(found)):
+            return found
+        return stretch if all(self._fine.motion(a, b) for a, b in pairwise(stretch)) else None
+
+    def _nudged(self, stretch: Array) -> Array | None:
+        """Return a way through one point near what lies between the ends, farther and farther from it."""
+        rng, space = np.random.default_rng(self._seeds.spawn(1)[0]), self._space
+        start, goal = stretch[0], stretch[-1]
+        for size in np.geomspace(*_NUDGES) * space.extent:
+            if self._watch.stop():
+                break
+            if len(stretch) == 2:
+                point = start + rng.random() * space.difference(start, goal)
+            else:
+                point = stretch[rng.integers(1, len(stretch) - 1)]
+            point = space.enforced((point + rng.normal(size=space.dim) * size / space.weights)[None])[0]
+            if self._good(start, point) and self._good(point, goal):
+                return np.stack([start, point, goal])
+        return None
 
     def _good(self, start: Array, end: Array) -> bool:
         """Return whether an edge is valid at fine steps, and proved to be free."""
@@ -150,10 +172,26 @@ class Leg:
         dense = np.array([look.motion(a, b) for a, b in pairwise(path)], dtype=bool)
         certified = self._certified(path) & dense
         left = 0.0 if solved else self._space.distance(path[-1], goal)
-        return LegResult(solved and bool(dense.all()), path, certified, dense, left, resolution, look.resolution)
+        return LegResult(
+            solved and bool(dense.all()), self._by, path, certified, dense, left, resolution, look.resolution
+        )
 
 
-def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> Run:
+def _searched(run: Run, start: Array, goal: Array, stop: Callable[[], bool]) -> tuple[Array | None, Array]:
+    """Let a planner plan; return a path or None, and the way to what came nearest."""
+    found, path = run.solve(stop), run.path()
+    if path is None:
+        return None, np.stack([start])
+    # The very numbers of start and goal, which on circles may be whole turns away.
+    path[0] = start
+    if found:
+        path[-1] = goal
+    return (path if found else None), path
+
+
+def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> Counted:
+    if planner == BATCH:
+        return ExpandingRun(space, validity, start, goal, seed)
     # Imported here, because OMPL is an extra.
     bridge = import_module(".bridge", __package__)
     return bridge.OmplRun(space, validity, planner, start, goal, seed)

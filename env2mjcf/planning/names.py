@@ -18,13 +18,16 @@ OMPL_PLANNERS = {
     "FMT": "FMT",
     "BFMT": "BFMT",
 }
-AUTO = ("RRTConnect", "KPIECE")
+BATCH = "BatchEST"
+"""The planner of our own, which asks in batches."""
+
+AUTO = ("RRTConnect", BATCH)
 """The planners that `auto` lets take turns: the quick one, and one for narrow places."""
 
 OPTIMISING = ("RRTstar", "PRMstar")
 """Planners that go on improving what they have found for as long as they may."""
 
-PLANNERS = ("auto", *OMPL_PLANNERS)
+PLANNERS = ("auto", *OMPL_PLANNERS, BATCH)
 
 
 def known(name: str) -> str:

@@ -91,17 +91,17 @@ def plan_through(
         results.append(leg.plan(start, goal))
         if not results[-1].solved:
             break
-    return _joined(space, results, name, clock.perf_counter() - began, watch.checks, seed)
+    return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
 
 
-def _joined(space: PlanningSpace, legs: list[LegResult], planner: str, seconds: float, checks: int, seed: int) -> Plan:
+def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:
     path = np.concatenate([legs[0].path[:1], *(leg.path[1:] for leg in legs)])
     return Plan(
         solved=legs[-1].solved,
         path=space.full(path),
         certified=np.concatenate([leg.certified for leg in legs]),
         dense=np.concatenate([leg.dense for leg in legs]),
-        planner=planner,
+        planner=", ".join(dict.fromkeys(leg.planner for leg in legs)),
         seconds=seconds,
         checks=checks,
         length=space.path_length(path),

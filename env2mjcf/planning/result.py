@@ -20,7 +20,7 @@ class Plan:
             degrees of freedom. Not solved: the best approach, from the start to what came nearest to the goal.
         certified: (k - 1,) for each edge, whether it is proved that nothing touches on it (`Scene.edge_is_free`).
         dense: (k - 1,) for each edge, whether everything on it is valid at steps of `fine_step`.
-        planner: Who found it.
+        planner: Who found it, or looked for it; several where legs differ.
         seconds: How long it took, shortening and proofs included.
         checks: How many configurations were looked at; proofs, which look at distances, are not counted.
         length: Of the path: metres of a base, and how far a point of a robot moves, at most, by every other degree of

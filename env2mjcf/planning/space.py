@@ -122,6 +122,11 @@ class PlanningSpace:
         """Return the length of a path, (k, d)."""
         return float(self.lengths(self.difference(values[:-1], values[1:])).sum())
 
+    def enforced(self, values: Array) -> Array:
+        """Return configurations, (n, d), within the limits, angles of circles from -pi to pi."""
+        reduced = values - self._whole_turns * np.floor(values / (2 * np.pi) + 0.5)
+        return np.clip(reduced, self.lower, self.upper)
+
     def draw(self, n: int, rng: np.random.Generator) -> Array:
         """Draw configurations uniformly, (n, d)."""
         return rng.uniform(self.lower, self.upper, size=(n, self.dim))

@@ -17,7 +17,7 @@ _FIRST_TURN = 100_000
 class Run(Protocol):
     """A planner at work, which can be stopped and go on."""
 
-    validity: Validity
+    name: str
 
     def solve(self, stop: Callable[[], bool]) -> bool:
         """Plan until there is a solution, or until it is to stop; return whether there is one."""
@@ -28,8 +28,17 @@ class Run(Protocol):
         ...
 
 
+class Counted(Run, Protocol):
+    """One that tells how much it has looked at."""
+
+    validity: Validity
+
+
 class Turns:
     """Planners that take turns.
+
+    Attributes:
+        name: Who has found the solution; before that, who takes turns.
 
     Args:
         runs: Planners for the same start and goal.
@@ -37,20 +46,21 @@ class Turns:
         goal: (d,).
     """
 
-    def __init__(self, runs: Sequence[Run], space: PlanningSpace, goal: Array) -> None:
+    def __init__(self, runs: Sequence[Counted], space: PlanningSpace, goal: Array) -> None:
         self._runs, self._space, self._goal = runs, space, goal
         self._solved: Run | None = None
-        self.turn = _FIRST_TURN
+        self.name = " and ".join(run.name for run in runs)
+        self._turn = _FIRST_TURN
 
     def solve(self, stop: Callable[[], bool]) -> bool:
         """Let them plan until one has a solution, or until they are to stop."""
         while not stop():
             for run in self._runs:
-                end = run.validity.checks + self.turn
+                end = run.validity.checks + self._turn
                 if run.solve(lambda run=run, end=end: stop() or run.validity.checks >= end):
-                    self._solved = run
+                    self._solved, self.name = run, run.name
                     return True
-            self.turn *= 2
+            self._turn *= 2
         return False
 
     def path(self) -> Array | None:

@@ -195,7 +195,7 @@ def _in_view(shot: Shot) -> Array:
 
 def _rows(shot: Shot) -> Array:
     """Return all configurations that are drawn, (n, dim)."""
-    rows = np.array([frame.q for frame in shot.frames]).reshape(-1, shot.scene.space.dim)
+    rows = np.stack([frame.q for frame in shot.frames])
     return np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
 
 

@@ -51,8 +51,8 @@ def fine(scene: Scene, path: ArrayLike, parts: int = _PARTS_OF_AN_EDGE) -> Array
     steps = scene.space.difference(rows[:-1], rows[1:])
     unwound = rows[0] + np.concatenate([np.zeros((1, scene.space.dim)), np.cumsum(steps, axis=0)])
     at = np.arange((len(rows) - 1) * parts + 1) / parts
-    knots = np.arange(len(rows))
-    return np.stack([np.interp(at, knots, column) for column in unwound.T], axis=1).reshape(len(at), scene.space.dim)
+    knots = np.arange(len(rows), dtype=np.float64)
+    return _interpolated(at, knots, unwound)
 
 
 def lengths(scene: Scene, rows: Array) -> Array:
@@ -93,5 +93,12 @@ def paced(scene: Scene, path: ArrayLike, count: int) -> tuple[Array, float]:
     # Where nothing moves, time stands still.
     keep = np.concatenate([[True], np.diff(far) > 0])
     at = np.linspace(0.0, far[-1], count)
-    columns = [np.interp(at, far[keep], column) for column in rows[keep].T]
-    return np.stack(columns, axis=1), float(far[-1])
+    return _interpolated(at, far[keep], rows[keep]), float(far[-1])
+
+
+def _interpolated(at: Array, knots: Array, rows: Array) -> Array:
+    """Return rows between those at the knots, (len(at), d)."""
+    between = np.empty((len(at), rows.shape[1]))
+    for i, column in enumerate(rows.T):
+        between[:, i] = np.interp(at, knots, column)
+    return between

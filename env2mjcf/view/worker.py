@@ -141,7 +141,10 @@ class Artist:
         self._model.vis.global_.offwidth, self._model.vis.global_.offheight = width, height
         marks = _points(self._request["marks"]) + max(_points(frame["marks"]) for frame in self._request["frames"])
         room = 1000 + self._model.ngeom * (1 + len(self._ghosts)) + marks
-        return mujoco.Renderer(self._model, height, width, max_geom=room)
+        renderer = mujoco.Renderer(self._model, height, width, max_geom=room)
+        # Sheets have two sides.
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_CULL_FACE] = 0
+        return renderer
 
     def _placed(self, qpos: list[float]) -> mujoco.MjData:
         data = mujoco.MjData(self._model)

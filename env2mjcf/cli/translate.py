@@ -1,0 +1,126 @@
+"""`env2mjcf translate`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from rich.text import Text
+from tyro.conf import Positional
+
+from ..errors import DiagnosticLog
+from ..options import DialectName, Limits, PathArgument, Semantics
+from .arguments import Output, OutputFlags
+from .printing import one_line, print_diagnostics, print_json, print_parts
+
+if TYPE_CHECKING:
+    from ..model import Boundary, Environment
+    from ..translation import Written
+
+
+@dataclass(frozen=True, slots=True)
+class Translate:
+    """Write a scene in another dialect of the format.
+
+    Links, limits, tested pairs and boundary stay what they are; what the dialect cannot express is said, and what would
+    move links is refused. In dialect E each robot gets a file of its own beside the env file: new.env and new.robot.
+    Configurations of --query are turned into the dialect's numbers: new.query. Meshes stay where they are.
+
+    Examples:
+      env2mjcf translate serial.env -o new.env --dialect D --box -10 10 -10 10 -10 10
+      env2mjcf translate serial.env -o new.env --dialect E --query serial.query
+      env2mjcf translate box.env -o old.env --dialect C --robots box.robot
+      env2mjcf translate page.env -o page-as-meant.env --dialect A --semantics page
+
+    Attributes:
+        scene: An env file, an XML environment or a problem XML.
+        out: The env file to write.
+        dialect: The dialect to write: A (1998), B (May 2012), C (2013), D (2014) or E (2016).
+        robots: Dialect E robot files of the scene.
+        query: A query file to translate, too.
+        semantics: Whose reading of a dialect A connection: the planner's, or the web page's.
+        read_as: Read the scene as this dialect instead of telling it from the text.
+        mesh_dirs: More folders in which meshes are looked for.
+        allow_outside: May a problem name files outside its folder.
+        box: A boundary for a scene that has none, in file units; dialects C to E must have one.
+        strict: Refuse whatever would be lost.
+        limits: Bounds on hostile input.
+        output: How to report.
+    """
+
+    scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
+    out: Annotated[str, tyro.conf.arg(aliases=("-o",), metavar="NEW.env")]
+    dialect: DialectName
+    robots: tuple[PathArgument, ...] = ()
+    query: PathArgument | None = None
+    semantics: Semantics = "planner"
+    read_as: DialectName | None = None
+    mesh_dirs: tuple[PathArgument, ...] = ()
+    allow_outside: bool = False
+    box: Annotated[tuple[float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X0 X1 ... Z1")] = None
+    strict: bool = False
+    limits: Limits = field(default_factory=Limits)
+    output: OutputFlags = field(default_factory=Output)
+
+    def run(self) -> int:
+        """Translate, and say what was written."""
+        from ..formats.reading import read
+        from ..translation import translate, write_environment
+
+        if not self.out.lower().endswith(".env"):
+            raise ValueError(f"--out is {self.out}; expected a file that ends in .env")
+        scene = read(self.scene, **self._options())
+        result = translate(scene, self.dialect, strict=self.strict, boundary=self._boundary())
+        inputs = [str(p) for p in (self.scene, *self.robots, *([self.query] if self.query else []))]
+        written = write_environment(result.environment, self.out, mesh_dirs=self.mesh_dirs, inputs=inputs)
+        log = DiagnosticLog()
+        for found in (scene.diagnostics, result.notes, written.notes):
+            log.extend(found)
+        print_diagnostics(log, self.output.verbose)
+        if self.output.json:
+            print_json({"dialect": self.dialect, **_files(written), "diagnostics": tuple(log)})
+        else:
+            print_parts(_lines(result.environment, written))
+        return 0
+
+    def _boundary(self) -> Boundary | None:
+        from ..model import Boundary, BoundaryShape
+
+        if self.box is None:
+            return None
+        lower, upper = self.box[::2], self.box[1::2]
+        if not all(a < b for a, b in zip(lower, upper, strict=True)):
+            raise ValueError("--box is empty; expected the lower and the upper end of x, y and z")
+        return Boundary(BoundaryShape.BOX, lower, upper)
+
+    def _options(self) -> dict[str, Any]:
+        names = ("robots", "query", "semantics", "strict", "mesh_dirs", "allow_outside", "limits")
+        return {"dialect": self.read_as, **{name: getattr(self, name) for name in names}}
+
+
+def _files(written: Written) -> dict[str, Any]:
+    return {
+        "environment": written.environment,
+        "robots": written.robots,
+        "query": written.query,
+        "mesh_dirs": written.mesh_dirs,
+    }
+
+
+def _lines(scene: Environment, written: Written) -> Iterator[Text]:
+    robots, obstacles = len(scene.robots), len(scene.obstacles)
+    yield Text(
+        f"{one_line(str(written.environment))}: dialect {scene.dialect}, {robots} robot{'s' * (robots != 1)}, "
+        f"{obstacles} obstacle{'s' * (obstacles != 1)}",
+        "bold",
+    )
+    for robot in written.robots:
+        yield Text(f"{one_line(str(robot))}: a robot")
+    if written.query is not None:
+        count = sum(len(t.configurations) for t in scene.tasks)
+        yield Text(f"{one_line(str(written.query))}: {count} configurations")
+    if written.mesh_dirs:
+        folders = " ".join(one_line(str(f)) for f in written.mesh_dirs)
+        yield Text(f"its meshes stay where they are; to read it: --mesh-dirs {folders}")

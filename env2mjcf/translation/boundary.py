@@ -1,0 +1,85 @@
+"""Boundary and resolution in another dialect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ..formats.writers.decimals import settled
+from ..model import Boundary, BoundaryShape, Environment, Resolution
+from .losses import Losses
+
+_FLAT = {BoundaryShape.BOX: BoundaryShape.BOX2D, BoundaryShape.SPHERE: BoundaryShape.SPHERE2D}
+_SOLID = {flat: solid for solid, flat in _FLAT.items()}
+# File units; wide enough for any scene that was met, and narrow enough to draw samples from.
+_WIDE = 1e6
+
+
+def boundary(environment: Environment, losses: Losses) -> Boundary | None:
+    """Return the boundary, or what the dialect has in its place."""
+    found, dialect = environment.boundary, losses.dialect
+    if found is None:
+        return _wide(environment, losses) if losses.vocabulary.boundaries else None
+    if found.space != "workspace":
+        losses.lost("ENV177", "Boundary", f"text files bound the workspace, not the {found.space}", "", found.span)
+    fitting = replace(_fitting(found, environment, losses), space="workspace")
+    flat_ball = fitting.shape is BoundaryShape.SPHERE and len(fitting.center) == 2 and not losses.vocabulary.brackets
+    if fitting.shape in losses.vocabulary.boundaries and not flat_ball:
+        return fitting
+    if not losses.vocabulary.boundaries:
+        losses.lost(
+            "ENV160", "Boundary", f"dialect {dialect} has no boundary in its file; it is lost",
+            "its planner takes one on the command line or in XML", found.span,
+        )  # fmt: skip
+        return None
+    losses.lost(
+        "ENV160", "Boundary", f"dialect {dialect} has no {found.shape.value}; the boundary is lost", "", found.span
+    )
+    return _wide(environment, losses)
+
+
+def resolution(environment: Environment, losses: Losses) -> Resolution:
+    """Return the step sizes that the dialect can express."""
+    found, kept = environment.resolution, losses.vocabulary.resolution
+    given = [name for name in ("position", "position_factor", "orientation", "time", "rd") if getattr(found, name)]
+    lost = [name for name in given if name not in kept]
+    if lost:
+        listed = ", ".join(lost)
+        losses.lost(
+            "ENV162", "resolution", f"dialect {losses.dialect} has no resolution in its file for {listed}; lost"
+        )
+    values = {name: getattr(found, name) for name in given if name in kept}
+    if "orientation" in values:
+        values["orientation"] = settled(values["orientation"], losses.rules.configuration_angle)
+    return Resolution(**values)
+
+
+def _fitting(found: Boundary, environment: Environment, losses: Losses) -> Boundary:
+    """Name a boundary as the dialect does by the number of its axes."""
+    axes = len(found.lower or found.center)
+    shapes = losses.vocabulary.boundaries
+    if axes == 3 or found.shape not in shapes:
+        return replace(found, shape=_SOLID.get(found.shape, found.shape))
+    flat = _FLAT.get(found.shape, found.shape)
+    same = environment.dialect is losses.dialect
+    return found if same or flat not in shapes else replace(found, shape=flat)
+
+
+def _wide(environment: Environment, losses: Losses) -> Boundary:
+    longest = max((abs(x) for x in _lengths(environment)), default=0.0)
+    half = max(_WIDE, 10.0 ** math.ceil(math.log10(1000 * longest))) if longest > 0 else _WIDE
+    losses.lost(
+        "ENV161", "Boundary", f"dialect {losses.dialect} must have a boundary; written as a box from {-half:g} "
+        f"to {half:g}",
+        "give the boundary that is meant: boundary=Boundary(...) (--box X0 X1 Y0 Y1 Z0 Z1)",
+    )  # fmt: skip
+    return Boundary(BoundaryShape.BOX, (-half,) * 3, (half,) * 3)
+
+
+def _lengths(environment: Environment) -> Iterator[float]:
+    for multibody in environment.multibodies:
+        for body in multibody.bodies:
+            yield from body.pose.position if body.pose is not None else ()
+        for connection in multibody.connections:
+            yield from (*connection.to_dh.position, *connection.to_body.position, connection.dh.a, connection.dh.d)

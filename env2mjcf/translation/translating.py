@@ -1,0 +1,164 @@
+"""A whole environment in another dialect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from ..errors import Diagnostic, DiagnosticLog
+from ..model import Boundary, Dialect, Environment, MultiBody, PlannerRules
+from . import boundary as bounds
+from . import multibodies
+from .losses import Losses
+from .tasks import DofMap
+
+
+@dataclass(frozen=True)
+class Translation:
+    """An environment in another dialect.
+
+    Attributes:
+        environment: What `env_text` and, in dialect E, `robot_text` write; tasks in the dialect's own numbers.
+        notes: What the dialect cannot express, and what was done about it.
+        robots: How configurations of each robot turn into those of its translation.
+    """
+
+    environment: Environment
+    notes: tuple[Diagnostic, ...]
+    robots: tuple[DofMap, ...]
+
+
+def translate(
+    environment: Environment, dialect: Dialect | str, *, strict: bool = False, boundary: Boundary | None = None
+) -> Translation:
+    """Say in another dialect what an environment means.
+
+    The poses of all links are the same for every configuration, and so are limits, tested pairs and boundary; what the
+    dialect lacks is left out with a note. What would move links if it were left out is refused.
+
+    Args:
+        environment: A scene as it was read.
+        dialect: The dialect to turn it into; its own one only drops what that cannot express.
+        strict: Whether anything that is lost is an error.
+        boundary: A boundary for a scene that has none, in file units; dialects C to E must have one.
+
+    Raises:
+        ConversionError: The dialect cannot express how the robots move.
+        KinematicsError: A body of a robot is neither a base nor reached from one.
+        ValueError: There is no such dialect.
+    """
+    log = DiagnosticLog(strict)
+    losses = Losses(Dialect(dialect), log)
+    robots = _Robots(environment, losses)
+    found = _multibodies(environment, robots, losses)
+    _report_xml(environment, losses)
+    if environment.boundary is None and boundary is not None:
+        environment = replace(environment, boundary=boundary)
+    written = sum(m.robot_file is None for m in found)
+    result = replace(
+        environment,
+        dialect=losses.dialect,
+        multibodies=found,
+        boundary=bounds.boundary(environment, losses),
+        resolution=bounds.resolution(environment, losses),
+        tasks=tuple(robots.maps[t.robot].task(t) for t in environment.tasks),
+        semantics="planner",
+        declared_multibodies=written,
+        attributes=(),
+        planner_rules=PlannerRules(),
+        diagnostics=tuple(log),
+    )
+    return Translation(result, tuple(log), robots.maps)
+
+
+class _Robots:
+    """The robots of a scene and their translations."""
+
+    def __init__(self, environment: Environment, losses: Losses) -> None:
+        sources = environment.robots
+        meets = bool(environment.obstacles)
+        files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
+        self.translated = tuple(
+            replace(multibodies.robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
+        )
+        self.maps = tuple(DofMap.of(a, b) for a, b in zip(sources, self.translated, strict=True))
+        self._by_id = {id(s): t for s, t in zip(sources, self.translated, strict=True)}
+        _report_number(environment, losses)
+
+    def get(self, source: MultiBody) -> MultiBody | None:
+        """Return the translation of a robot; None where the multibody is none."""
+        return self._by_id.get(id(source))
+
+
+def _files(name: str, robots: Sequence[MultiBody]) -> list[str]:
+    """Name a file for each robot; one that has a text file keeps its name."""
+    if len(robots) == 1:
+        return [_kept(robots[0]) or f"{name}.robot"]
+    return [_kept(r) or f"{name}-{i}.robot" for i, r in enumerate(robots)]
+
+
+def _kept(robot: MultiBody) -> str | None:
+    file = robot.robot_file
+    return file if file is not None and PurePath(file).suffix.lower() != ".xml" else None
+
+
+def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> tuple[MultiBody, ...]:
+    found: list[MultiBody] = []
+    for source in environment.multibodies:
+        robot = robots.get(source)
+        if robot is not None:
+            found.append(robot)
+        elif source.kind in losses.vocabulary.kinds:
+            found += multibodies.obstacles(source, losses)
+        else:
+            found += _surface(source, losses)
+    if losses.vocabulary.robot_files:
+        found.sort(key=lambda m: m.robot_file is not None)
+    elif losses.vocabulary.legacy_bodies and environment.dialect is not losses.dialect:
+        # Its planner moves multibody 0, whatever the tag says (env-format section 4.2).
+        found.sort(key=lambda m: not m.moves)
+    return tuple(found)
+
+
+def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
+    name, dialect = source.label or source.bodies[0].filename, losses.dialect
+    if not losses.vocabulary.legacy_bodies:
+        losses.lost(
+            "ENV174", name, f"dialect {dialect} has no surfaces; {name}, which only is drawn, is lost", "", source.span
+        )
+        return []
+    losses.lost(
+        "ENV174", name, f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an "
+        "obstacle", "", source.span,
+    )  # fmt: skip
+    return list(multibodies.obstacles(source, losses))
+
+
+def _report_number(environment: Environment, losses: Losses) -> None:
+    if not losses.vocabulary.legacy_bodies or environment.dialect is losses.dialect:
+        return
+    robots = environment.robots
+    if not robots and environment.multibodies:
+        losses.refuse(
+            "ENV176", environment.name, "a scene without robot: dialect A takes its first multibody for one",
+            "add a robot, with robots=[...] (--robots) if it has a file of its own",
+        )  # fmt: skip
+    if len(robots) > 1:
+        losses.lost(
+            "ENV176", environment.name, f"{len(robots)} robots; the planner of dialect A moves the first only, and "
+            "takes the others for obstacles", "", robots[1].span,
+        )  # fmt: skip
+
+
+def _report_xml(environment: Environment, losses: Losses) -> None:
+    if environment.attributes:
+        listed = ", ".join(name for name, _ in environment.attributes)
+        losses.lost("ENV177", "<Environment>", f"text files have no attributes of the planner; lost: {listed}")
+    rules = environment.planner_rules
+    # One link apart is the default.
+    if rules.ignore_self_collision or rules.adjacent_links not in (None, 1):
+        losses.lost(
+            "ENV177", environment.name, "text files do not say which pairs of links are tested; what the problem "
+            "file says about that is lost", "choose with adjacent_links and self_collision",
+        )  # fmt: skip
