@@ -152,6 +152,9 @@ CATALOGUE: dict[str, str] = {
     "GEO261": "The geometry cache cannot be read or written; everything is computed.",
     "GEO262": "CoACD crashed, hung, or gave no parts.",
     "GEO263": "A mesh that is not convex collides as approximate parts, by choice.",
+    "GEO270": "Polygons of a mesh take more work to cut into triangles than `limits.polygon_work`.",
+    "GEO271": "The bodies of a scene have more triangles in all than `limits.scene_elements`.",
+    "GEO272": "The bodies of a scene collide as more convex pieces in all than `limits.scene_cells`.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
     "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",

@@ -26,7 +26,7 @@ class Span:
         line: Line number, from 1.
         column: Column of the first character, from 1.
         length: Number of characters, at least 1; a span never leaves its line.
-        text: The whole source line without its line end.
+        text: The whole source line without its line end; empty where it is too long to be quoted.
     """
 
     path: str

@@ -30,6 +30,11 @@ class Limits:
         connections: Connections in a scene.
         mesh_elements: Vertices, and polygon corners, of one mesh.
         name_length: Characters in a file name or label.
+        polygon_corners: Corners of one polygon of a mesh.
+        polygon_work: Points looked at while polygons of one mesh are cut into triangles: a polygon that is not
+            convex takes up to the square of its corners, or more.
+        scene_elements: Triangles of all bodies of a scene, those of a mesh that several bodies have counted each time.
+        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way.
     """
 
     file_bytes: int = 512 * 1024 * 1024
@@ -37,6 +42,10 @@ class Limits:
     connections: int = 100_000
     mesh_elements: int = 50_000_000
     name_length: int = 4096
+    polygon_corners: int = 10_000
+    polygon_work: int = 20_000_000
+    scene_elements: int = 500_000_000
+    scene_cells: int = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,7 +90,15 @@ def _read(file: NumberFile) -> MeshArrays:
     corners, counts, first = _polygons(file, 4 + 2 * parts + 3 * n_vertices, n_vertices, n_polygons)
     _check_header(file, n_edges, ranges.reshape(-1, 2), n_polygons, len(corners))
     starts = np.cumsum(counts) - counts
-    faces = faces_of(vertices, corners, counts, file.path, file.log, place=lambda k: file.span(first + int(starts[k])))
+    faces = faces_of(
+        vertices,
+        corners,
+        counts,
+        file.path,
+        file.log,
+        limits=file.limits,
+        place=lambda k: file.span(first + int(starts[k])),
+    )
     return vertices, faces
 
 

@@ -41,4 +41,4 @@ def read_gms(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     file.nothing_after(first + at, f"the last of {n_polygons} polygons")
     counts = np.diff(np.array([*starts, first + at], dtype=np.int64)) - 1
     indices = np.array(corners, dtype=np.int64)
-    return vertices, faces_of(vertices, indices, counts, path, log, place=lambda k: file.span(starts[k]))
+    return vertices, faces_of(vertices, indices, counts, path, log, limits=limits, place=lambda k: file.span(starts[k]))

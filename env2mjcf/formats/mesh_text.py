@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Limits
 from .numbers import Numbers, find_numbers, span_of
-from .polygons import triangulate
+from .polygons import TooMuchWorkError, triangulate
 
 # Vertices (n, 3) and triangles (m, 3): what every mesh reader returns.
 MeshArrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 _BOM = b"\xef\xbb\xbf"
-
-# Ear clipping takes a time that grows with the square of the corners. The planner read at most 20 (env-format 10.1).
-_MOST_CORNERS = 10_000
 
 
 def as_bytes(text: str | bytes) -> bytes:
@@ -134,6 +131,7 @@ def faces_of(
     path: str,
     log: DiagnosticLog,
     *,
+    limits: Limits,
     place: Callable[[int], Span],
 ) -> NDArray[np.int64]:
     """Cut a file's polygons into triangles and say where they are more, or less, than triangles.
@@ -144,12 +142,14 @@ def faces_of(
         counts: Number of corners of each polygon.
         path: The file, for messages.
         log: Where findings go.
+        limits: Bounds on hostile input.
         place: Where a polygon stands in the file.
     """
-    if counts.size and counts.max() > _MOST_CORNERS:
+    if counts.size and counts.max() > limits.polygon_corners:
         worst = int(counts.argmax())
-        message = f"a polygon has {counts[worst]} corners; at most {_MOST_CORNERS} are read"
-        log.fail(GeometryError, "GEO227", path, message, hint="triangulate the mesh", span=place(worst))
+        message = f"a polygon has {counts[worst]} corners; at most {limits.polygon_corners} are read"
+        hint = "triangulate the mesh, or raise limits=Limits(polygon_corners=...)"
+        log.fail(GeometryError, "GEO227", path, message, hint=hint, span=place(worst))
     small = np.flatnonzero(counts < 3)
     if small.size:
         message = f"{small.size} of {counts.size} polygons have fewer than three corners; skipped"
@@ -168,7 +168,21 @@ def faces_of(
     kept = np.flatnonzero(counts >= 3)
     if not kept.size:
         log.fail(GeometryError, "GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
-    faces, crossing = triangulate(vertices, corners[np.repeat(counts >= 3, counts)], counts[kept])
+    try:
+        faces, crossing = triangulate(
+            vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], limits.polygon_work
+        )
+    except TooMuchWorkError as stopped:
+        worst = int(kept[stopped.polygon])
+        log.fail(
+            GeometryError,
+            "GEO270",
+            path,
+            f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have to "
+            f"be looked at; this polygon has {counts[worst]} corners and is not convex",
+            hint="triangulate the mesh, or raise limits=Limits(polygon_work=...)",
+            span=place(worst),
+        )
     if crossing:
         message = f"{len(crossing)} polygons cross themselves; what they enclose is a guess"
         log.warn(GeometryError, "GEO222", path, message, span=place(int(kept[crossing[0]])))

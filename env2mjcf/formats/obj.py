@@ -172,4 +172,4 @@ def _faces(rows: _Rows, vertices_before: NDArray[np.int64], vertices: NDArray[np
             "negative indices count back from the last vertex; the original planner does not read them",
             span=rows.span(int(negative[0])),
         )
-    return faces_of(vertices, corners, rows.counts, rows.path, rows.log, place=rows.row_span)
+    return faces_of(vertices, corners, rows.counts, rows.path, rows.log, limits=rows.limits, place=rows.row_span)

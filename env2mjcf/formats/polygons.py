@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,21 @@ Indices = NDArray[np.int64]
 _FLAT = 1e-12
 
 
-def triangulate(vertices: Vectors, corners: Indices, counts: Indices) -> tuple[Indices, list[int]]:
+class TooMuchWorkError(Exception):
+    """Cutting takes more work than is allowed.
+
+    Args:
+        polygon: The one at which the work was spent.
+    """
+
+    def __init__(self, polygon: int) -> None:
+        super().__init__(polygon)
+        self.polygon = polygon
+
+
+def triangulate(
+    vertices: Vectors, corners: Indices, counts: Indices, work: float = math.inf
+) -> tuple[Indices, list[int]]:
     """Cut polygons into triangles that keep every edge and the orientation of their polygon.
 
     A convex polygon becomes a fan around its first corner. Others are cut by ear clipping (Meisters, "Polygons
@@ -22,10 +38,14 @@ def triangulate(vertices: Vectors, corners: Indices, counts: Indices) -> tuple[I
         vertices: (n, 3) points.
         corners: Indices into `vertices`, polygon after polygon.
         counts: Number of corners of each polygon, at least 3.
+        work: How many points may be looked at in search of ears.
 
     Returns:
         (m, 3) triangles in the order of the polygons, and the polygons found to cross themselves, what was left of
         each cut as a fan.
+
+    Raises:
+        TooMuchWorkError: More points would have to be looked at.
     """
     first_corner = np.cumsum(counts) - counts
     first_face = np.cumsum(counts - 2) - (counts - 2)
@@ -39,7 +59,10 @@ def triangulate(vertices: Vectors, corners: Indices, counts: Indices) -> tuple[I
             continue
         flat = _flattened(vertices[polygons])
         for row in np.flatnonzero(~_convex(flat)).tolist():
-            triples, whole = _clip_ears(flat[row])
+            triples, whole, looked_at = _clip_ears(flat[row], work)
+            work -= looked_at
+            if work < 0:
+                raise TooMuchWorkError(int(which[row]))
             start = int(first_face[which[row]])
             faces[start : start + n - 2] = polygons[row][triples]
             if not whole:
@@ -82,12 +105,17 @@ def _convex(flat: Vectors) -> NDArray[np.bool_]:
     return (cross > _FLAT).all(axis=1) & (turn < 3 * np.pi)
 
 
-def _clip_ears(points: Vectors) -> tuple[Indices, bool]:
-    """Cut one (n, 2) polygon; return (n - 2, 3) positions, and False where it crosses itself."""
+def _clip_ears(points: Vectors, work: float) -> tuple[Indices, bool, int]:
+    """Cut one (n, 2) polygon, or stop when more points than `work` were looked at.
+
+    Returns:
+        (n - 2, 3) positions, False where it crosses itself, and how many points were looked at.
+    """
     ring = list(range(len(points)))
     triples: list[tuple[int, int, int]] = []
-    at, misses = 0, 0
-    while len(ring) > 3 and misses < len(ring):
+    at, misses, looked_at = 0, 0, 0
+    while len(ring) > 3 and misses < len(ring) and looked_at <= work:
+        looked_at += len(ring)
         ear = (ring[at - 1], ring[at], ring[(at + 1) % len(ring)])
         if _is_ear(points, ear, ring):
             triples.append(ear)
@@ -101,7 +129,7 @@ def _clip_ears(points: Vectors) -> tuple[Indices, bool]:
     areas = _doubled_areas(points[fan])
     # What is left of a polygon that does not cross itself is a triangle, or has no area.
     whole = bool((areas >= -_FLAT).all()) and (len(ring) == 3 or bool((areas <= _FLAT).all()))
-    return np.concatenate([np.array(triples, dtype=np.int64).reshape(-1, 3), fan]), whole
+    return np.concatenate([np.array(triples, dtype=np.int64).reshape(-1, 3), fan]), whole, looked_at
 
 
 def _is_ear(points: Vectors, ear: tuple[int, int, int], ring: list[int]) -> bool:

@@ -12,9 +12,10 @@ from .rows import row_text
 from .source import Source
 
 _START, _STOP = "#####GRAPHSTART#####", "#####GRAPHSTOP#####"
-_GRAPH_START = re.compile(r"\S*GRAPHSTART\S*")
-_GRAPH_STOP = re.compile(r"\S*GRAPHSTOP\S*")
-_SECTION = re.compile(r"#{3,}(PREAMBLE|ENVFILE|LP|CD|DM|RNGSEED)START#{3,}[ \t]*")
+# What stands in front of a word is looked at once, not from each of its characters on: that takes quadratic time.
+_GRAPH_START = re.compile(r"(?<!\S)\S*?GRAPHSTART\S*")
+_GRAPH_STOP = re.compile(r"(?<!\S)\S*?GRAPHSTOP\S*")
+_SECTION = re.compile(r"(?<!#)#{3,}(PREAMBLE|ENVFILE|LP|CD|DM|RNGSEED)START#{3,}[ \t]*")
 # What would end the line of the env file's name, or begin a section in it, or is no text.
 _UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]|#{3,}|(?<=GRAPH)(?=ST)")
 _VERSION = re.compile(r"\s*(PMPL )?Roadmap Version( Number)?\s+(\S+)", re.IGNORECASE)
@@ -124,7 +125,10 @@ def roadmap_text(nodes: Iterable[Node], environment: str, *, index: bool) -> str
 
 def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
     version = _VERSION.match(source.text, 0, end)
-    sections = {m[1]: _section(source, m, end, log) for m in _SECTION.finditer(source.text, 0, end)}
+    begins = list(_SECTION.finditer(source.text, 0, end))
+    # A section ends before the next one begins.
+    ends = (*(m.start() for m in begins[1:]), end)
+    sections = {m[1]: _section(source, m, stop, log) for m, stop in zip(begins, ends, strict=False)}
 
     def lines(name: str) -> tuple[str, ...]:
         # The first line says how many follow.
@@ -140,7 +144,7 @@ def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
 
 
 def _section(source: Source, begin: re.Match[str], end: int, log: DiagnosticLog) -> list[str]:
-    stop = re.compile(rf"#{{3,}}{begin[1]}STOP#{{3,}}").search(source.text, begin.end(), end)
+    stop = re.compile(rf"(?<!#)#{{3,}}{begin[1]}STOP#{{3,}}").search(source.text, begin.end(), end)
     if stop is None:
         log.warn(
             FormatError, "CFG530", source.path, f"this section has no end; expected '#####{begin[1]}STOP#####'",

@@ -15,6 +15,8 @@ from ..options import Limits, PathArgument
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+# Longer lines are not quoted: a scene on one line would be quoted whole by every body in it.
+_LONGEST_QUOTE = 1000
 _SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query", ".path", ".map")
 
 
@@ -42,13 +44,13 @@ class Source:
             yield start, self._line(row)
 
     def span(self, start: int, end: int | None = None) -> Span:
-        """Return the place of `text[start:end]`, cut at the end of its first line."""
+        """Return the place of `text[start:end]`, cut at the end of its first line; long lines are not quoted."""
         row = bisect.bisect_right(self._starts, start) - 1
-        begin = self._starts[row]
-        line = self._line(row)
-        column = min(start - begin, len(line)) + 1
-        length = 1 if end is None else max(1, min(end - start, len(line) - column + 1))
-        return Span(self.path, row + 1, column, length, line)
+        begin, stop = self._starts[row], self._line_end(row)
+        start = min(start, stop)
+        length = 1 if end is None else max(1, min(end, stop) - start)
+        quote = self.text[begin:stop] if stop - begin <= _LONGEST_QUOTE else ""
+        return Span(self.path, row + 1, start - begin + 1, length, quote)
 
     def line_span(self, line: int, near: str = "") -> Span:
         """Return the place of a line, given from 1; of the word `near` in it where that occurs."""
@@ -60,8 +62,15 @@ class Source:
         return Span(self.path, row + 1, column + 1, len(near), text)
 
     def _line(self, row: int) -> str:
+        return self.text[self._starts[row] : self._line_end(row)]
+
+    def _line_end(self, row: int) -> int:
+        """Return where a line ends, its line end not counted."""
+        begin = self._starts[row]
         end = self._starts[row + 1] if row + 1 < len(self._starts) else len(self.text)
-        return self.text[self._starts[row] : end].rstrip("\r\n")
+        while end > begin and self.text[end - 1] in "\r\n":
+            end -= 1
+        return end
 
 
 def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at: Span | None = None) -> Source:

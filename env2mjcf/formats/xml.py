@@ -24,7 +24,7 @@ _MARKUP = re.compile(
 )
 _ATTRIBUTE = re.compile(r"([^\s\"'=<>/]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _ENTITY = re.compile(r"<!ENTITY")
-_ENCODING = re.compile(r"^(<\?xml[^>]*?)\s+encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+_ENCODING = re.compile(r"^(<\?xml[^>]*?\s)encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')")
 _PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
 _PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
 
@@ -160,12 +160,13 @@ class Node:
 
     def ignore_other_attributes(self, *known: str) -> None:
         """Report the attributes that nothing reads."""
-        for name in self.attributes:
-            if name not in known:
-                self.log.info(
-                    "ENV311", f"<{self.tag}>", f"attribute {name!r} of <{self.tag}> is not used",
-                    hint=did_you_mean(name, known), span=self.span_of(name),
-                )  # fmt: skip
+        others = [name for name in self.attributes if name not in known]
+        places = self._values() if others else {}
+        for name in others:
+            self.log.info(
+                "ENV311", f"<{self.tag}>", f"attribute {name!r} of <{self.tag}> is not used",
+                hint=did_you_mean(name, known), span=self.source.span(*places[name]) if name in places else self.span,
+            )  # fmt: skip
 
     def ignore(self, message: str) -> None:
         """Report that nothing reads this element."""
@@ -176,11 +177,12 @@ class Node:
         return self.document.places.get(self.element, (0, 0))
 
     def _value(self, name: str) -> tuple[int, int] | None:
-        start, end = self._place
-        for match in _ATTRIBUTE.finditer(self.source.text, start, end):
-            if match.group(1) == name:
-                return match.span(2) if match.group(2) is not None else match.span(3)
-        return None
+        return self._values().get(name)
+
+    def _values(self) -> dict[str, tuple[int, int]]:
+        """Return where the value of every attribute stands."""
+        found = _ATTRIBUTE.finditer(self.source.text, *self._place)
+        return {m.group(1): m.span(2) if m.group(2) is not None else m.span(3) for m in found}
 
     def _nodes(self, elements: Any, tags: tuple[str, ...]) -> Iterator[Node]:
         wanted = {t.lower() for t in tags}

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
-from ..errors import ConversionError, DiagnosticLog
+from ..errors import ConversionError, DiagnosticLog, GeometryError
 from ..kinematics import RobotKinematics
 from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
@@ -189,6 +190,8 @@ class _Meshes:
         self._analyses: dict[Mesh, Analysis] = {}
         self._shapes: dict[Mesh, CollisionShape] = {}
         self._certificates: dict[Mesh, Certificate] = {}
+        self._elements = 0
+        self._cells = 0
 
     def mesh(self, body: Body) -> Mesh:
         """Return a body's mesh, recentred and scaled."""
@@ -198,6 +201,10 @@ class _Meshes:
             if path not in self._raw:
                 self._raw[path] = load_mesh(path, self._log, self._options.limits)
             self._meshes[key] = self._raw[path].recentred(body.recentring).scaled(self._options.scale)
+        self._elements += len(self._meshes[key].faces)
+        if self._elements > self._options.limits.scene_elements:
+            at_most = self._options.limits.scene_elements
+            self._refuse("GEO271", body, f"more than {at_most} triangles in all", "scene_elements")
         return self._meshes[key]
 
     def part(self, placed: _Placed, thickness: float | None, *, moves: bool) -> Part:
@@ -211,11 +218,20 @@ class _Meshes:
         if thickness is not None and mesh not in self._shapes:
             self._shape(mesh, analysis, thickness, body)
         shape = None if thickness is None else self._shapes[mesh]
+        self._cells += 0 if shape is None else len(shape.pieces)
+        if self._cells > options.limits.scene_cells:
+            at_most = options.limits.scene_cells
+            self._refuse("GEO272", body, f"more than {at_most} convex pieces in all", "scene_cells")
         proof = None if thickness is None else self._certificates[mesh]
         inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None
         if inertia is not None and inertia.note:
             self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
         return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia, proof)
+
+    def _refuse(self, code: str, body: Body, what: str, limit: str) -> NoReturn:
+        message = f"the bodies up to this one have {what}, which is the limit"
+        hint = f"raise limits=Limits({limit}=...)"
+        self._log.fail(GeometryError, code, body.filename, message, hint=hint, span=body.span)
 
     def _shape(self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body) -> None:
         strategy, log, cache = self._options.collision, self._log, self._cache
