@@ -21,6 +21,7 @@ from known import Known, bytes_of
 
 import env2mjcf
 from env2mjcf.cli.main import main as command
+from env2mjcf.errors import ConversionError
 from env2mjcf.planning import plan
 from env2mjcf.view import RenderError, film, offscreen, picture
 from env2mjcf.view.viewer import Viewer
@@ -301,7 +302,7 @@ class Operations:
             name = self._rng.choice(("a.gif", "a.mp4"))
             film(known.scene, known.q[:2], folder / name, seconds=0.2, fps=10, size=(64, 48))
             self.pictures += 2
-            with contextlib.suppress(RenderError, ValueError, OSError):
+            with contextlib.suppress(RenderError, ConversionError):
                 film(known.scene, known.q[:2], folder / "none" / "a.gif", seconds=0.2, fps=10, size=(64, 48))
 
     # Helpers.
