@@ -70,6 +70,10 @@ CATALOGUE: dict[str, str] = {
     "ENV177": "Text files cannot express something that an XML file says; it is lost.",
     "ENV178": "The name of a mesh file is no single word.",
     "ENV179": "A translation cannot be written.",
+    # Limits.
+    "ENV180": "An XML file has more elements, or more within each other, than `limits.elements` and `limits.nesting`.",
+    "ENV181": "An XML file holds a text or an attribute of more than ten million characters.",
+    "ENV182": "A file has more configurations or nodes than `limits.rows`.",
     # Text files that are doubtful.
     "ENV201": "A keyword is written in a case that the original reader does not take.",
     "ENV202": "A keyword is misspelt, or another word stands in its place; it was read as meant.",
@@ -155,6 +159,9 @@ CATALOGUE: dict[str, str] = {
     "GEO270": "Polygons of a mesh take more work to cut into triangles than `limits.polygon_work`.",
     "GEO271": "The bodies of a scene have more triangles in all than `limits.scene_elements`.",
     "GEO272": "The bodies of a scene collide as more convex pieces in all than `limits.scene_cells`.",
+    "GEO273": "A mesh takes more work to repair and to cut into convex pieces than `limits.mesh_work`.",
+    "GEO274": "A mesh file is UTF-16 or UTF-32 text.",
+    "GEO275": "The bodies of a scene make more pairs that may touch than `limits.pairs`.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
     "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",

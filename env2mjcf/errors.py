@@ -26,7 +26,8 @@ class Span:
         line: Line number, from 1.
         column: Column of the first character, from 1.
         length: Number of characters, at least 1; a span never leaves its line.
-        text: The whole source line without its line end; empty where it is too long to be quoted.
+        text: The source line without its line end; of a very long one the part around the place, between dots.
+        skipped: How many columns of the line `text` leaves out in front; column `skipped + 1` is its first.
     """
 
     path: str
@@ -34,6 +35,7 @@ class Span:
     column: int
     length: int = 1
     text: str = ""
+    skipped: int = 0
 
     def __str__(self) -> str:
         return f"{self.path}:{self.line}:{self.column}"
@@ -41,8 +43,9 @@ class Span:
     def excerpt(self) -> str:
         """Return the source line with a caret line under it."""
         # Tabs stay tabs in the caret line, so that the caret stands under its column.
-        indent = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
-        length = max(1, min(self.length, len(self.text) - self.column + 1))
+        before = self.column - 1 - self.skipped
+        indent = "".join("\t" if c == "\t" else " " for c in self.text[:before])
+        length = max(1, min(self.length, len(self.text) - before))
         return f"    {self.text}\n    {indent}{'^' * length}"
 
 

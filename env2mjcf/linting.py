@@ -24,6 +24,7 @@ from .formats.xml import parse_xml
 from .geometry.loading import READABLE, load_mesh
 from .geometry.repair import repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
+from .geometry.work import TooMuchWorkError, Work, refuse_work
 from .kinematics import RobotKinematics
 from .model import Body, Environment, MultiBody, MultiBodyKind
 from .options import Options, PathArgument
@@ -208,4 +209,8 @@ def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
 def _lint_mesh(path: Path, options: Options, log: DiagnosticLog, body: Body | None = None) -> None:
     mesh = load_mesh(path, log, options.limits)
     subject, span = (body.filename, body.span) if body else (str(path), None)
-    repair_diagnostics(mesh, repaired(mesh), log, subject=subject, span=span)
+    try:
+        result = repaired(mesh, Work(options.limits.mesh_work))
+    except TooMuchWorkError:
+        refuse_work(options.limits, log, subject, span)
+    repair_diagnostics(mesh, result, log, subject=subject, span=span)

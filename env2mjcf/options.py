@@ -35,6 +35,12 @@ class Limits:
             convex takes up to the square of its corners, or more.
         scene_elements: Triangles of all bodies of a scene, those of a mesh that several bodies have counted each time.
         scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way.
+        mesh_work: Comparisons of parts of one mesh while it is repaired and cut into convex pieces: about half a
+            microsecond each.
+        pairs: Pairs of bodies of a scene that may touch.
+        rows: Configurations of one query, path or text of rows; nodes of one roadmap.
+        nesting: Elements of an XML file within each other; those that are read need seven.
+        elements: Elements of an XML file.
     """
 
     file_bytes: int = 512 * 1024 * 1024
@@ -46,6 +52,16 @@ class Limits:
     polygon_work: int = 20_000_000
     scene_elements: int = 500_000_000
     scene_cells: int = 2_000_000
+    mesh_work: int = 200_000_000
+    pairs: int = 2_000_000
+    rows: int = 5_000_000
+    nesting: int = 100
+    elements: int = 1_000_000
+
+    @staticmethod
+    def hint(name: str) -> str:
+        """Return what to do where an input that is trusted passes a limit."""
+        return f"raise limits=Limits({name}=...), on the command line --limits.{name.replace('_', '-')}"
 
 
 @dataclass(frozen=True, slots=True)

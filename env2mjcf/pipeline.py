@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import Diagnostic, DiagnosticLog
+from .errors import Diagnostic, DiagnosticLog, GeometryError
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
 from .mjcf.compiler import Document, compile_mjcf
 from .model import Environment
 from .names import dof_names
-from .options import Options, PathArgument
+from .options import Limits, Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
 from .scaling import scaled
 from .space import ConfigurationSpace
@@ -60,9 +60,20 @@ def compile_assembly(environment: Environment, assembly: Assembly, options: Opti
     space = configuration_space(assembly, options)
     robots = [Robot(r.kinematics, r.names) for r in assembly.robots]
     obstacles = [p.name for p in assembly.obstacles]
+    _check_pairs(sum(len(r.links) for r in robots), len(obstacles), environment, options, log)
     pairs = pair_table(robots, obstacles, options, environment.planner_rules)
     document = compile_mjcf(assembly, space, pairs, options, log)
     return Compiled(environment, assembly, space, pairs, document, options, tuple(log))
+
+
+def _check_pairs(links: int, obstacles: int, environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    count, at_most = links * obstacles + links * (links - 1) // 2, options.limits.pairs
+    if count > at_most:
+        log.fail(
+            GeometryError, "GEO275", environment.name,
+            f"{links} links and {obstacles} obstacles make {count} pairs of bodies; at most {at_most} are compared",
+            hint=Limits.hint("pairs"),
+        )  # fmt: skip
 
 
 def recompile(compiled: Compiled, exclude: Sequence[tuple[str, str]], log: DiagnosticLog) -> Compiled:

@@ -19,8 +19,9 @@ def main() -> None:
     """Run until a fault, or the time that libFuzzer was given."""
     if len(sys.argv) < 2 or sys.argv[1] not in READERS:
         sys.exit(f"{__doc__}\nreaders: {', '.join(READERS)}")
-    atheris.Setup([sys.argv[0], "-timeout=10", "-rss_limit_mb=3000", "-max_len=20000", *sys.argv[2:]],
-                  READERS[sys.argv[1]])
+    atheris.Setup(
+        [sys.argv[0], "-timeout=10", "-rss_limit_mb=3000", "-max_len=20000", *sys.argv[2:]], READERS[sys.argv[1]]
+    )
     atheris.Fuzz()
 
 

@@ -19,9 +19,9 @@ NUMBERS = [
     b"0x10", b"1.#INF", b"1_000", b"1e", b".", b"+", b"1d5", b"1e150", b"1e60", b"1e17", b"100000",
 ]  # fmt: skip
 ODD = [
-    b"\0", b"\xff", b"\xef\xbb\xbf", b"\xc3\xa9", b"\xd9\xa3", b"\r", b"\n", b"\x1b[2J", b"\xe2\x80\xae", b"#", b"# x\n",
-    b"//", b"<", b">", b"&lt;", b"&x;", b"<!--", b"]]>", b"\"", b"'", b"[", b"]", b";", b":", b"-c(", b"-a(", b")", b"/",
-    b"\\", b"../", b"..", b"\\\n",
+    b"\0", b"\xff", b"\xef\xbb\xbf", b"\xc3\xa9", b"\xd9\xa3", b"\r", b"\n", b"\x1b[2J", b"\xe2\x80\xae", b"#",
+    b"<", b">", b"&lt;", b"&x;", b"<!--", b"]]>", b"\"", b"'", b"[", b"]", b";", b":", b"-c(", b"-a(", b")", b"/",
+    b"\\", b"//", b"../", b"..", b"\\\n",
 ]  # fmt: skip
 
 

@@ -113,7 +113,8 @@ def _only_ours(read: Callable[[bytes], None]) -> Callable[[bytes], None]:
         try:
             read(data)
         except Env2MjcfError as error:
-            assert str(error), "an error without a message"
+            if not str(error):
+                raise AssertionError("an error without a message") from error
 
     return run
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
-from ..formats.rows import LARGEST, coordinate, coordinate_hint, split_row
+from ..formats.rows import LARGEST, check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
 from ..options import Limits
 from ..simulation.edge_verdicts import Edges
@@ -181,6 +181,7 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
                 span=source.line_span(line),
             )  # fmt: skip
         found.append((f"line {line}", row))
+        check_rows(source, len(found), log, source.line_span(line))
     if not found:
         log.fail(
             FormatError, "CFG503", source.path, f"{source.path} holds no configuration; expected rows of numbers",

@@ -10,6 +10,7 @@ from typing import TypeVar
 from ..dialects import RULES, DialectRules
 from ..errors import FormatError, Span
 from ..model import Body, Comment, DHForm, DHParameters, Dialect, MultiBodyKind, Pose
+from ..options import Limits
 from .lexer import Scanner, parse_number
 
 T = TypeVar("T")
@@ -129,7 +130,7 @@ def warn_of_count(scan: Scanner, declared: int, found: int, what: str, span: Spa
 def check_limit(scan: Scanner, found: int, at_most: int, what: str, limit: str) -> None:
     """Refuse more things than `limits` allow; `limit` is the name of the field."""
     if found > at_most:
-        scan.fail("ENV110", f"more than {at_most} {_plural(what)}", hint=f"raise limits=Limits({limit}=...)")
+        scan.fail("ENV110", f"more than {at_most} {_plural(what)}", hint=Limits.hint(limit))
 
 
 def with_directives(scan: Scanner, body: Body, comments: Sequence[Comment]) -> Body:

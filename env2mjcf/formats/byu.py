@@ -131,7 +131,7 @@ def _polygons(
             "GEO209",
             first,
             f"the polygons have {len(indices)} corners; at most {file.limits.mesh_elements} are read",
-            hint="raise limits=Limits(mesh_elements=...)",
+            hint=Limits.hint("mesh_elements"),
         )
     file.nothing_after(last, f"the last of {n_polygons} polygons")
     return np.abs(indices) - 1, np.diff(ends[:n_polygons], prepend=-1), first

@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import NoReturn
 
 from ..errors import DiagnosticLog, FormatError
-from .rows import coordinate, coordinate_hint
+from .rows import check_rows, coordinate, coordinate_hint
 from .source import Source
 
 _WORD = re.compile(r"\S+")
@@ -76,6 +76,7 @@ class _Layout:
 @dataclass(frozen=True, slots=True)
 class _Word:
     text: str
+    value: float | None
     start: int
     first: bool  # of its line
 
@@ -124,6 +125,7 @@ def read_nodes(
             # What the version suggests speaks, unless another layout understood more of the nodes.
             best = (reading.understood, misfit) if best is None or reading.understood > best[0] else best
             continue
+        check_rows(source, len(nodes), log, source.span(part[0]))
         # Numbers that happen to fit may still be cut up wrongly: every planner begins a line with each node.
         if reading.aligned and len(nodes) == count:
             return tuple(nodes), _dropped(layout)
@@ -141,7 +143,7 @@ def _words(source: Source, begin: int, end: int) -> list[_Word]:
             continue
         low, high = max(0, begin - start), min(len(text), end - start)
         for n, match in enumerate(_WORD.finditer(text, low, high)):
-            words.append(_Word(match.group(), start + match.start(), n == 0))
+            words.append(_Word(match.group(), coordinate(match.group()), start + match.start(), n == 0))
     return words
 
 
@@ -252,7 +254,7 @@ class _Reading:
     def _number(self, expected: str) -> float:
         if self._at >= len(self._words):
             raise _Misfit(self._at, expected)
-        value = coordinate(self._words[self._at].text)
+        value = self._words[self._at].value
         if value is None:
             raise _Misfit(self._at, expected)
         self._at += 1

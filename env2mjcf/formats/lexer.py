@@ -145,7 +145,7 @@ class Scanner:
             self.fail(
                 "ENV109",
                 f"a word of {length} characters; at most {self.limits.name_length} are read",
-                hint="raise limits=Limits(name_length=...)",
+                hint=Limits.hint("name_length"),
             )
         self._position = match.end()
         return Token(match.group(), match.start(), match.end())
@@ -167,7 +167,7 @@ class Scanner:
         start = self.position
         value = self.integer(what)
         if not 0 <= value <= at_most:
-            hint = f"raise limits=Limits({limit}=...)" if value > 0 else "write how many follow"
+            hint = Limits.hint(limit) if value > 0 else "write how many follow"
             self.fail("ENV110", f"{what} is {value}; expected 0 to {at_most}", hint=hint, span=self.span(start))
         return value
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Limits
+from .lexer import number_hint
 from .numbers import Numbers, find_numbers, span_of
 from .polygons import TooMuchWorkError, triangulate
 
@@ -74,7 +75,7 @@ class NumberFile:
         hint = "a file of numbers has no comments" if found.startswith(("#", "%", "/")) else ""
         if not found.isprintable():
             hint = "is it a binary file?"
-        self.fail("GEO211", good, f"expected {what(good)}, found {_short(found)}", hint=hint)
+        self.fail("GEO211", good, f"expected {what(good)}, found {_short(found)}", hint=hint or number_hint(found))
 
     def integers(self, first: int, last: int, what: Callable[[int], str]) -> NDArray[np.int64]:
         """Return the tokens `first` to `last - 1`, which must be integers."""
@@ -97,7 +98,7 @@ class NumberFile:
                 "GEO209",
                 token,
                 f"{what} is {self.numbers.text(token)}; at most {self.limits.mesh_elements} are read",
-                hint="raise limits=Limits(mesh_elements=...)",
+                hint=Limits.hint("mesh_elements"),
             )
         return value
 
@@ -148,7 +149,7 @@ def faces_of(
     if counts.size and counts.max() > limits.polygon_corners:
         worst = int(counts.argmax())
         message = f"a polygon has {counts[worst]} corners; at most {limits.polygon_corners} are read"
-        hint = "triangulate the mesh, or raise limits=Limits(polygon_corners=...)"
+        hint = f"triangulate the mesh, or {Limits.hint('polygon_corners')}"
         log.fail(GeometryError, "GEO227", path, message, hint=hint, span=place(worst))
     small = np.flatnonzero(counts < 3)
     if small.size:
@@ -180,7 +181,7 @@ def faces_of(
             path,
             f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have to "
             f"be looked at; this polygon has {counts[worst]} corners and is not convex",
-            hint="triangulate the mesh, or raise limits=Limits(polygon_work=...)",
+            hint=f"triangulate the mesh, or {Limits.hint('polygon_work')}",
             span=place(worst),
         )
     if crossing:

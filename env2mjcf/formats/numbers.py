@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Span
+from .source import DOTS, quoted
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
@@ -21,8 +22,6 @@ _BLANKS = re.compile(rb"\s")
 
 # Bytes that are split into words at once, so that the words of a large file never lie in memory together.
 _CHUNK = 1 << 20
-# Longer lines are not quoted: a file without line ends would be quoted whole.
-_LONGEST_QUOTE = 400
 
 
 def _table(characters: bytes) -> NDArray[np.bool_]:
@@ -145,9 +144,13 @@ def span_of(path: str, data: bytes, start: int, end: int) -> Span:
     begin = max(head.rfind(b"\n"), head.rfind(b"\r")) + 1
     line = len(_LINE_END.findall(head)) + 1
     match = _LINE.match(data, begin)
-    text = match.group().decode("utf-8", "replace") if match else ""
-    column = len(data[begin:start].decode("utf-8", "replace")) + 1
-    return Span(path, line, column, max(1, end - start), text if len(text) <= _LONGEST_QUOTE else "")
+    stop = match.end() if match else begin
+    first, last = quoted(begin, stop, start)
+    left, right = DOTS * (first > begin), DOTS * (last < stop)
+    skipped = len(data[begin:first].decode("utf-8", "replace"))
+    column = skipped + len(data[first:start].decode("utf-8", "replace")) + 1
+    text = f"{left}{data[first:last].decode('utf-8', 'replace')}{right}"
+    return Span(path, line, column, max(1, end - start), text, skipped - len(left))
 
 
 def column_layouts(data: bytes) -> Iterator[bytes]:

@@ -64,7 +64,7 @@ class _Rows(NumberFile):
                 "GEO209",
                 path,
                 f"{path} has {len(self.row)} numbers; at most {limits.mesh_elements} vertices or corners are read",
-                hint="raise limits=Limits(mesh_elements=...)",
+                hint=Limits.hint("mesh_elements"),
             )
 
     def span(self, token: int) -> Span:

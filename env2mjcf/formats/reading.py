@@ -99,7 +99,7 @@ def _check_limits(environment: Environment, limits: Limits, log: DiagnosticLog) 
         if found > at_most:
             log.fail(
                 FormatError, "ENV110", environment.path, f"the scene has {found} {what}; at most {at_most} are read",
-                hint=f"raise limits=Limits({what}=...)",
+                hint=Limits.hint(what),
             )  # fmt: skip
 
 

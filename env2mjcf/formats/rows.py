@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from ..errors import DiagnosticLog, FormatError, Span
+from ..options import Limits
 from .lexer import number_hint, parse_number
 from .source import Source
 
@@ -112,7 +113,22 @@ def number_lines(source: Source, log: DiagnosticLog, start: int = 0) -> list[Lin
             numbers.append(value)
         if numbers:
             lines.append(Line(tuple(numbers), source.span(*first)))
+            check_rows(source, len(lines), log, source.span(begin))
     return lines
+
+
+def check_rows(source: Source, count: int, log: DiagnosticLog, span: Span) -> None:
+    """Make sure that a file has not more configurations or nodes than its limits allow.
+
+    Raises:
+        FormatError: It has.
+    """
+    if count > source.limits.rows:
+        log.fail(
+            FormatError, "ENV182", source.path,
+            f"{source.path} has more than {source.limits.rows} configurations; at most so many are read",
+            hint=Limits.hint("rows"), span=span,
+        )  # fmt: skip
 
 
 def _extra(width: int, dof: int, *, legacy: bool) -> Extra | None:

@@ -14,9 +14,16 @@ from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
 from ..options import Limits, PathArgument
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
-_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
-# Longer lines are not quoted: a scene on one line would be quoted whole by every body in it.
-_LONGEST_QUOTE = 1000
+DOTS = "..."
+"""Stands where a quoted line is cut."""
+
+# Characters of a line that are quoted at most, and those of them in front of the place.
+_LONGEST_QUOTE, _BEFORE = 400, 60
+# A mark of UTF-32 begins like one of UTF-16.
+_MARKS = {b"\xff\xfe\0\0": "UTF-32", b"\0\0\xfe\xff": "UTF-32", b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
+# Of four bytes of such text without a mark, those that are zero, for what is written in the Latin alphabet.
+_ZEROS: dict[tuple[int, ...], str] = {(1, 3): "UTF-16", (0, 2): "UTF-16", (1, 2, 3): "UTF-32", (0, 1, 2): "UTF-32"}
+_ENOUGH = 64
 _SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query", ".path", ".map")
 
 
@@ -27,16 +34,18 @@ class Source:
     Attributes:
         path: The file, as it was named by the caller.
         text: The whole text, without a byte order mark; line ends as in the file.
+        limits: What may be in it.
     """
 
     path: str
     text: str
+    limits: Limits = field(default_factory=Limits, repr=False, compare=False)
     _starts: tuple[int, ...] = field(default=(0,), repr=False, compare=False)
 
     @classmethod
-    def of(cls, path: str, text: str) -> Source:
+    def of(cls, path: str, text: str, limits: Limits | None = None) -> Source:
         """Index the lines of a text; a line feed, a carriage return or both end a line."""
-        return cls(path, text, (0, *(m.end() for m in _LINE_END.finditer(text))))
+        return cls(path, text, limits or Limits(), (0, *(m.end() for m in _LINE_END.finditer(text))))
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Iterate the lines: where each starts in the text, and what it says without its line end."""
@@ -44,22 +53,30 @@ class Source:
             yield start, self._line(row)
 
     def span(self, start: int, end: int | None = None) -> Span:
-        """Return the place of `text[start:end]`, cut at the end of its first line; long lines are not quoted."""
+        """Return the place of `text[start:end]`, cut at the end of its first line."""
         row = bisect.bisect_right(self._starts, start) - 1
         begin, stop = self._starts[row], self._line_end(row)
         start = min(start, stop)
         length = 1 if end is None else max(1, min(end, stop) - start)
-        quote = self.text[begin:stop] if stop - begin <= _LONGEST_QUOTE else ""
-        return Span(self.path, row + 1, start - begin + 1, length, quote)
+        first, last = quoted(begin, stop, start)
+        text = f"{DOTS * (first > begin)}{self.text[first:last]}{DOTS * (last < stop)}"
+        return Span(self.path, row + 1, start - begin + 1, length, text, first - begin - len(DOTS) * (first > begin))
 
     def line_span(self, line: int, near: str = "") -> Span:
         """Return the place of a line, given from 1; of the word `near` in it where that occurs."""
         row = min(max(line, 1), len(self._starts)) - 1
         text = self._line(row)
         column = text.find(near) if near else -1
+        start = self._starts[row]
         if column < 0:
-            return Span(self.path, row + 1, len(text) - len(text.lstrip()) + 1, 1, text)
-        return Span(self.path, row + 1, column + 1, len(near), text)
+            return self.span(start + len(text) - len(text.lstrip()))
+        return self.span(start + column, start + column + len(near))
+
+    def column_span(self, line: int, column: int) -> Span:
+        """Return the place of a column of a line, both given from 1; the nearest where there is no such one."""
+        row = min(max(line, 1), len(self._starts)) - 1
+        start = self._starts[row]
+        return self.span(start + max(0, min(column - 1, self._line_end(row) - start)))
 
     def _line(self, row: int) -> str:
         return self.text[self._starts[row] : self._line_end(row)]
@@ -71,6 +88,26 @@ class Source:
         while end > begin and self.text[end - 1] in "\r\n":
             end -= 1
         return end
+
+
+def quoted(begin: int, end: int, place: int) -> tuple[int, int]:
+    """Return which part of the line from `begin` to `end` is quoted about a place.
+
+    The whole line, unless it is very long: each of the bodies of a scene on one line would hold it whole.
+    """
+    if end - begin <= _LONGEST_QUOTE:
+        return begin, end
+    first = max(begin, min(place - _BEFORE, end - _LONGEST_QUOTE))
+    return first, min(end, first + _LONGEST_QUOTE)
+
+
+def wide_encoding(data: bytes) -> str:
+    """Return which of the encodings with two or four bytes a character a text is in; nothing where it is in none."""
+    for mark, name in _MARKS.items():
+        if data.startswith(mark):
+            return name
+    begin = data[: min(_ENOUGH, len(data) // 4 * 4)]
+    return _ZEROS.get(tuple(i for i in range(4) if begin and not any(begin[i::4])), "")
 
 
 def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at: Span | None = None) -> Source:
@@ -85,13 +122,14 @@ def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at
         named_at: Where another file names this one, for messages.
 
     Raises:
-        FormatError: The file is missing, a folder, unreadable, too large, UTF-16, or not text.
+        FormatError: The file is missing, a folder, unreadable, too large, UTF-16 or UTF-32, or not text.
     """
     name = os.fsdecode(path)
     data = _read_bytes(name, log, limits, named_at)
-    if data.startswith(_UTF16_MARKS):
+    wide = wide_encoding(data)
+    if wide:
         log.fail(
-            FormatError, "ENV106", name, f"{name} is UTF-16 text; expected UTF-8 or Latin-1",
+            FormatError, "ENV106", name, f"{name} is {wide} text; expected UTF-8 or Latin-1",
             hint="save it as UTF-8", span=Span(name, 1, 1),
         )  # fmt: skip
     if b"\0" in data:
@@ -104,9 +142,9 @@ def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at
             hint="name the scene's text file, not a mesh or an archive", span=Span(name, place.line, place.column),
         )  # fmt: skip
     try:
-        return Source.of(name, data.decode("utf-8-sig"))
+        return Source.of(name, data.decode("utf-8-sig"), limits)
     except UnicodeDecodeError as error:
-        source = Source.of(name, data.decode("latin-1"))
+        source = Source.of(name, data.decode("latin-1"), limits)
         place = source.span(error.start)
         log.warn(
             FormatError, "ENV108", name,
@@ -141,7 +179,7 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
         fail(
             "ENV105",
             f"{name} has more than {limits.file_bytes} bytes; at most so many are read",
-            "raise limits=Limits(file_bytes=...)",
+            Limits.hint("file_bytes"),
         )
     return data
 

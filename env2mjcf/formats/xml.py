@@ -25,6 +25,8 @@ _MARKUP = re.compile(
 _ATTRIBUTE = re.compile(r"([^\s\"'=<>/]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _ENTITY = re.compile(r"<!ENTITY")
 _ENCODING = re.compile(r"^(<\?xml[^>]*?\s)encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+# Bytes that are parsed at once; nesting beyond which lxml refuses all but huge trees; how it calls texts beyond that.
+_PART, _LXML_NESTING, _HUGE_TEXT = 1 << 14, 250, "huge text node"
 _PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
 _PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
 
@@ -204,23 +206,27 @@ def parse_xml(source: Source, log: DiagnosticLog, limits: Limits) -> Node:
             FormatError, "ENV144", source.path, "XML entity declarations are not read; expected plain XML",
             hint="write the text itself where an entity stands", span=source.span(*entity.span()),
         )  # fmt: skip
-    root, end = _parse(source, log)
+    root, end = _parse(source, log, limits)
     tags = (m.span() for m in _MARKUP.finditer(source.text, 0, end) if m.group("tag"))
     # lxml elements are proxies: they are equal while one is alive, so the map holds them as keys.
     places = dict(zip((e for e in root.iter() if isinstance(e.tag, str)), tags, strict=False))
     return Node(root, _Document(source, log, limits, places))
 
 
-def _parse(source: Source, log: DiagnosticLog) -> tuple[Any, int]:
+def _parse(source: Source, log: DiagnosticLog, limits: Limits) -> tuple[Any, int]:
     """Return the root and where the text that was read ends."""
     begin = len(source.text) - len(source.text.lstrip())
     try:
-        return _from_text(source.text[begin:]), len(source.text)
+        return _from_text(source, source.text[begin:], log, limits), len(source.text)
     except etree.XMLSyntaxError as error:
         line, column = error.position
         place = source.line_span(line + source.span(begin).line - 1)
-        column = max(1, min(column, len(place.text) + 1))
-        span = Span(place.path, place.line, column, 1, place.text)
+        span = source.column_span(place.line, column)
+        if _HUGE_TEXT in str(error.msg):
+            log.fail(
+                FormatError, "ENV181", source.path, "a text of more than ten million characters is not read",
+                hint="what is read in it are names and numbers", span=span,
+            )  # fmt: skip
         message = f"not well-formed XML: {str(error.msg).rstrip()}"
         cut = _problem_alone(source, place.line)
         if cut is None:
@@ -233,16 +239,45 @@ def _parse(source: Source, log: DiagnosticLog) -> tuple[Any, int]:
         )  # fmt: skip
         closing, end = cut
         try:
-            return _from_text(source.text[begin:end] + closing), end
+            return _from_text(source, source.text[begin:end] + closing, log, limits), end
         except etree.XMLSyntaxError:
             log.fail(FormatError, "ENV140", source.path, message, hint="close every tag", span=span)
 
 
-def _from_text(text: str) -> Any:
+def _from_text(source: Source, text: str, log: DiagnosticLog, limits: Limits) -> Any:
+    """Parse text part by part, so that a hostile one is refused before it is a tree.
+
+    Raises:
+        FormatError: Too many elements, or too many within each other.
+        etree.XMLSyntaxError: The text is not well-formed.
+    """
     # The declared encoding is dropped: the text is decoded already, and lxml would decode it once more.
     data = _ENCODING.sub(r"\1", text).encode("utf-8")
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False, load_dtd=False)
-    return etree.fromstring(data, parser)
+    parser: Any = etree.XMLPullParser(
+        ("start", "end"), resolve_entities=False, no_network=True, load_dtd=False,
+        huge_tree=limits.nesting > _LXML_NESTING,
+    )  # fmt: skip
+    depth = count = 0
+    for at in range(0, max(1, len(data)), _PART):
+        try:
+            parser.feed(data[at : at + _PART])
+        finally:
+            for event, element in parser.read_events():
+                depth += 1 if event == "start" else -1
+                count += event == "start"
+                for what, found in (("nesting", depth), ("elements", count)):
+                    if found > getattr(limits, what):
+                        _refuse(source, element.sourceline, what, log, limits)
+    return parser.close()
+
+
+def _refuse(source: Source, line: int, what: str, log: DiagnosticLog, limits: Limits) -> NoReturn:
+    most = getattr(limits, what)
+    found = f"more than {most} elements lie within each other" if what == "nesting" else f"more than {most} elements"
+    log.fail(
+        FormatError, "ENV180", source.path, f"{found}; at most so many are read", hint=Limits.hint(what),
+        span=source.line_span(line),
+    )  # fmt: skip
 
 
 def _problem_alone(source: Source, fault_line: int) -> tuple[str, int] | None:

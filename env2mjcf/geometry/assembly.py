@@ -13,7 +13,7 @@ from ..errors import ConversionError, DiagnosticLog, GeometryError
 from ..kinematics import RobotKinematics
 from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
-from ..options import Options
+from ..options import Limits, Options
 from ..transforms import Array
 from .analysis import Analysis
 from .cache import GeometryCache, default_folder
@@ -21,9 +21,10 @@ from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .loading import load_mesh
 from .mesh import Mesh
-from .repair import repair_diagnostics, repaired
+from .repair import Repaired, repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
+from .work import TooMuchWorkError, Work, refuse_work
 
 # Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
 _THICKNESS_PER_EXTENT = 5e-6
@@ -190,6 +191,7 @@ class _Meshes:
         self._analyses: dict[Mesh, Analysis] = {}
         self._shapes: dict[Mesh, CollisionShape] = {}
         self._certificates: dict[Mesh, Certificate] = {}
+        self._work: dict[Mesh, Work] = {}
         self._elements = 0
         self._cells = 0
 
@@ -211,7 +213,7 @@ class _Meshes:
         """Give a placed body its shape (none without a thickness) and its inertia (where it moves)."""
         mesh, body, options = placed.mesh, placed.body, self._options
         if mesh not in self._analyses:
-            result = repaired(mesh)
+            result = self._repaired(mesh, body)
             self._analyses[mesh] = result.analysis
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis = self._analyses[mesh]
@@ -230,12 +232,22 @@ class _Meshes:
 
     def _refuse(self, code: str, body: Body, what: str, limit: str) -> NoReturn:
         message = f"the bodies up to this one have {what}, which is the limit"
-        hint = f"raise limits=Limits({limit}=...)"
-        self._log.fail(GeometryError, code, body.filename, message, hint=hint, span=body.span)
+        self._log.fail(GeometryError, code, body.filename, message, hint=Limits.hint(limit), span=body.span)
+
+    def _repaired(self, mesh: Mesh, body: Body) -> Repaired:
+        work = self._work[mesh] = Work(self._options.limits.mesh_work)
+        try:
+            return repaired(mesh, work)
+        except TooMuchWorkError:
+            refuse_work(self._options.limits, self._log, body.filename, body.span)
 
     def _shape(self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body) -> None:
         strategy, log, cache = self._options.collision, self._log, self._cache
-        shape = collision_shape(mesh, analysis, strategy, thickness, log, body.filename, body.span, cache)
+        work = self._work[mesh]
+        try:
+            shape = collision_shape(mesh, analysis, strategy, thickness, log, body.filename, body.span, cache, work)
+        except TooMuchWorkError:
+            refuse_work(self._options.limits, log, body.filename, body.span)
         self._shapes[mesh] = shape
         self._certificates[mesh] = proof = certificate(shape, thickness, cache, log)
         if shape.strategy == "coacd":

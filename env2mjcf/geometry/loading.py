@@ -15,6 +15,7 @@ from ..formats.byu import read_byu
 from ..formats.gms import read_gms
 from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
+from ..formats.source import wide_encoding
 from ..options import Limits
 from .mesh import Mesh
 
@@ -49,6 +50,10 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
         )
     data = _content(path, log, limits)
     if extension in _READERS:
+        wide = wide_encoding(data)
+        if wide:
+            message = f"{path} is {wide} text; expected ASCII, UTF-8 or Latin-1"
+            log.fail(GeometryError, "GEO274", str(path), message, hint="save it as UTF-8")
         vertices, faces = _READERS[extension](data, str(path), log, limits)
     else:
         log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
@@ -70,7 +75,7 @@ def _content(path: Path, log: DiagnosticLog, limits: Limits) -> bytes:
             "GEO209",
             str(path),
             f"{path} has more than {limits.file_bytes} bytes",
-            hint="raise limits=Limits(file_bytes=...)",
+            hint=Limits.hint("file_bytes"),
         )
     return data
 
@@ -97,5 +102,5 @@ def _through_trimesh(data: bytes, extension: str, path: Path, log: DiagnosticLog
         message = (
             f"{path} has {len(vertices)} vertices and {faces.size} corners; at most {limits.mesh_elements} are read"
         )
-        log.fail(GeometryError, "GEO209", str(path), message, hint="raise limits=Limits(mesh_elements=...)")
+        log.fail(GeometryError, "GEO209", str(path), message, hint=Limits.hint("mesh_elements"))
     return vertices, faces

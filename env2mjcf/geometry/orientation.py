@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .topology import Bools, Edges, Floats, Ints, connected, edges
+from .work import Work
 
 _BLOCK = 2_000_000  # solid angles held in memory at once
 
@@ -37,12 +38,17 @@ def rewound(faces: Ints) -> tuple[Ints, bool]:
     return (out, True) if wound_alike(edges(out)) else (faces, False)
 
 
-def winding_numbers(points: Floats, vertices: Floats, faces: Ints) -> Floats:
+def winding_numbers(points: Floats, vertices: Floats, faces: Ints, work: Work | None = None) -> Floats:
     """Return how often the surface winds around each point, (k,): 0 outside, 1 inside, in between if it is open.
 
     Sums signed solid angles (van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed.
     Eng. 30(2), 1983).
+
+    Raises:
+        TooMuchWorkError: Points and faces make more pairs than `work` has left.
     """
+    if work is not None:
+        work.spend(len(points) * len(faces))
     out = np.empty(len(points))
     step = max(1, _BLOCK // max(1, len(faces)))
     for i in range(0, len(points), step):
@@ -56,7 +62,7 @@ def winding_numbers(points: Floats, vertices: Floats, faces: Ints) -> Floats:
     return out
 
 
-def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats) -> Bools:
+def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, work: Work) -> Bools:
     """Tell which components of a closed, consistently wound surface are wound inside out, (c,).
 
     A component of negative volume that lies in no other one is inside out, and everything in it was wound by the same
@@ -67,6 +73,7 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats) 
         faces: (m, 3).
         component: (m,) component of each face.
         volumes: (c,) signed volume of each component.
+        work: What may be done.
     """
     flipped = np.zeros(len(volumes), dtype=np.bool_)
     if not (volumes < 0).any() or len(volumes) == 1:
@@ -78,14 +85,15 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats) 
     # The middle of a face stays clear of edges that components may share.
     probes = np.array([vertices[g[0]].mean(axis=0) for g in groups])
     for i in np.flatnonzero(volumes < 0):
+        work.spend(len(groups))
         around = np.flatnonzero((low <= low[i]).all(axis=1) & (high >= high[i]).all(axis=1))
-        if any(_holds(vertices, groups[j], probes[i : i + 1])[0] for j in around if j != i):
+        if any(_holds(vertices, groups[j], probes[i : i + 1], work)[0] for j in around if j != i):
             continue
         within = np.flatnonzero((low >= low[i]).all(axis=1) & (high <= high[i]).all(axis=1))
-        flipped[within[_holds(vertices, groups[i], probes[within])]] = True
+        flipped[within[_holds(vertices, groups[i], probes[within], work)]] = True
         flipped[i] = True
     return flipped
 
 
-def _holds(vertices: Floats, faces: Ints, points: Floats) -> Bools:
-    return np.abs(winding_numbers(points, vertices, faces)) > 0.5
+def _holds(vertices: Floats, faces: Ints, points: Floats, work: Work) -> Bools:
+    return np.abs(winding_numbers(points, vertices, faces, work)) > 0.5

@@ -12,8 +12,10 @@ from .analysis import Analysis, analyse, mesh_diagnostics
 from .folds import unfolded
 from .mesh import Mesh
 from .topology import Floats, Ints, edges
+from .triangle_search import Jobs, Search
+from .triangle_tree import forest
+from .work import COSTLY, Work
 
-_BLOCK = 2_000_000  # distances held in memory at once
 _PASSES = 10
 
 
@@ -39,31 +41,35 @@ class Repaired:
     sheets: int = 0
 
 
-def repaired(mesh: Mesh) -> Repaired:
+def repaired(mesh: Mesh, work: Work | None = None) -> Repaired:
     """Analyse a mesh; where open edges run along each other with different vertices, cut the faces there.
 
     Then unfold what is folded, if the surface is that of a solid.
+
+    Raises:
+        TooMuchWorkError: It takes more than `work` has left.
     """
-    return _without_folds(mesh, _without_t_junctions(mesh))
+    work = work or Work()
+    return _without_folds(mesh, _without_t_junctions(mesh, work), work)
 
 
-def _without_t_junctions(mesh: Mesh) -> Repaired:
-    before = analyse(mesh)
+def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
+    before = analyse(mesh, work)
     open_before = _open_edges(before.faces)
     if before.dimension < 3 or not open_before:
         return Repaired(before)
     faces, source = before.faces, np.arange(len(before.faces))
     for _ in range(_PASSES):
-        faces, source, found = _cut(before.vertices, faces, source, before.tolerance)
+        faces, source, found = _cut(before.vertices, faces, source, before.tolerance, work)
         if not found:
             break
     if _open_edges(faces) >= open_before:
         return Repaired(before)
-    after = _again(mesh, before, faces, source)
+    after = _again(mesh, before, faces, source, work)
     return Repaired(after, int((np.bincount(source) > 1).sum()), open_before)
 
 
-def _without_folds(mesh: Mesh, result: Repaired) -> Repaired:
+def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
     before = result.analysis
     # A convex mesh collides as its hull, whatever its faces are.
     new = unfolded(before) if before.solid and not before.convex else None
@@ -71,7 +77,7 @@ def _without_folds(mesh: Mesh, result: Repaired) -> Repaired:
         return result
     # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
     after = replace(
-        _again(mesh, before, new.faces, new.source),
+        _again(mesh, before, new.faces, new.source, work),
         consistent=before.consistent,
         inverted=before.inverted,
         signed_volume=before.signed_volume,
@@ -83,9 +89,9 @@ def _without_folds(mesh: Mesh, result: Repaired) -> Repaired:
     return replace(result, analysis=after, folded_faces=new.rebuilt, sheets=new.sheets)
 
 
-def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints) -> Analysis:
+def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work) -> Analysis:
     """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up."""
-    after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path))
+    after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path), work)
     return replace(
         after,
         source=before.source[source[after.source]],
@@ -126,13 +132,14 @@ def _open_edges(faces: Ints) -> int:
     return int((edges(faces).faces % 2).sum())
 
 
-def _cut(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> tuple[Ints, Ints, bool]:
+def _cut(vertices: Floats, faces: Ints, source: Ints, tolerance: float, work: Work) -> tuple[Ints, Ints, bool]:
     """Cut each face that has vertices on one of its open edges into a fan; one edge of a face at a time."""
     table = edges(faces)
     lone = np.flatnonzero((table.faces == 1)[table.of_corner].ravel())
     start, end = faces[lone // 3, lone % 3], faces[lone // 3, (lone % 3 + 1) % 3]
     candidates = np.unique(table.ends[table.faces % 2 == 1])
-    edge, vertex = _between(vertices, start, end, candidates, tolerance)
+    edge, vertex = _between(vertices, start, end, candidates, tolerance, work)
+    work.spend(COSTLY * len(edge))
     if len(edge) == 0:
         return faces, source, False
     first = np.full(len(faces), faces.size)
@@ -154,24 +161,30 @@ def _cut(vertices: Floats, faces: Ints, source: Ints, tolerance: float) -> tuple
     return np.vstack([faces[whole], cut]), np.concatenate([source[whole], cut_source]), True
 
 
-def _between(vertices: Floats, start: Ints, end: Ints, candidates: Ints, tolerance: float) -> tuple[Ints, Ints]:
+def _between(
+    vertices: Floats, start: Ints, end: Ints, candidates: Ints, tolerance: float, work: Work
+) -> tuple[Ints, Ints]:
     """Return (edge, vertex) for all vertices within edges, ordered along each edge."""
     points = vertices[candidates]
-    found: list[tuple[Ints, Ints, Floats]] = []
-    step = max(1, _BLOCK // max(1, len(candidates)))
-    for i in range(0, max(1, len(start)), step):
-        origin = vertices[start[i : i + step]]
-        along = vertices[end[i : i + step]] - origin
-        length = np.linalg.norm(along, axis=1, keepdims=True)
-        along /= length
-        offset = points[None] - origin[:, None]
-        at = np.einsum("evj,ej->ev", offset, along)
-        inside = (at > tolerance) & (at < length - tolerance)
-        e, v = np.nonzero(inside)
-        beside = offset[e, v] - at[e, v, None] * along[e]
-        near = np.linalg.norm(beside, axis=1) <= tolerance
-        e, v = e[near], v[near]
-        found.append((e + i, candidates[v], at[e, v]))
-    edge, vertex, at = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    order = np.lexsort((at, edge))
-    return edge[order], vertex[order]
+    e, v = _near(np.stack([vertices[start], vertices[end], vertices[end]], axis=1), points, tolerance, work)
+    origin = vertices[start[e]]
+    along = vertices[end[e]] - origin
+    length = np.linalg.norm(along, axis=1)
+    along /= length[:, None]
+    offset = points[v] - origin
+    at = np.einsum("ij,ij->i", offset, along)
+    beside = np.linalg.norm(offset - at[:, None] * along, axis=1)
+    found = (at > tolerance) & (at < length - tolerance) & (beside <= tolerance)
+    order = np.flatnonzero(found)[np.lexsort((v[found], at[found], e[found]))]
+    return e[order], candidates[v[order]]
+
+
+def _near(segments: Floats, points: Floats, tolerance: float, work: Work) -> tuple[Ints, Ints]:
+    """Return (segment, point) for all that may be within the tolerance: both are triangles without area."""
+    if not len(segments):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    trees = forest([segments, np.repeat(points[:, None], 3, axis=1)])
+    first = np.zeros(1, dtype=np.int64)
+    jobs = Jobs(first, first + 1, np.eye(3)[None], np.zeros((1, 3)), first)
+    _, segment, point = Search(trees, jobs, np.array([np.inf]), tolerance).within(tolerance, work).T
+    return segment, point - len(segments)

@@ -20,6 +20,7 @@ from .pieces import ConvexPiece, hull_piece, prisms
 from .polygons import Polygon, convex_polygons
 from .shells import Shells, shells
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
+from .work import Work
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 
@@ -61,6 +62,7 @@ def collision_shape(
     subject: str = "",
     span: Span | None = None,
     cache: GeometryCache | None = None,
+    work: Work | None = None,
 ) -> CollisionShape:
     """Choose the convex pieces that stand for a mesh in collision.
 
@@ -73,8 +75,10 @@ def collision_shape(
         subject: What the findings are about; the mesh's name if empty.
         span: Where the mesh is named in the source.
         cache: Where results are kept between runs, if they are.
+        work: What may be done; None sets no bound.
 
     Raises:
+        TooMuchWorkError: It takes more.
         GeometryError: The mesh is a point or a line (GEO231), too small for MuJoCo (GEO241), or CoACD fails (GEO262).
         ValueError: The thickness is not positive, the strategy is unknown, or its package is not installed.
     """
@@ -84,7 +88,7 @@ def collision_shape(
         raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, _STRATEGIES))}")
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject or mesh.name, span)
-    build = partial(_STRATEGIES[strategy], mesh, analysis, thickness)
+    build = partial(_STRATEGIES[strategy], mesh, analysis, thickness, work or Work())
     try:
         if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
             shape = cache.remember(
@@ -118,7 +122,7 @@ def _report_omission(shape: CollisionShape, log: DiagnosticLog, subject: str, sp
     report(GeometryError, "GEO241", subject, message, hint=hint, span=span)
 
 
-def _hull(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     piece = hull_piece(analysis.vertices, thickness)
     return CollisionShape(mesh, "hull", (piece,), False, analysis, _hull_note(analysis, piece))
 
@@ -136,7 +140,7 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
     return f"one hull of a non-convex mesh: claims {extra:.3g} times its volume more than it has"
 
 
-def _surface(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     faces = analysis.faces
     polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
@@ -162,14 +166,14 @@ def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
     return f"{_count(len(hulls), 'convex part')} as {'a hull' if len(hulls) == 1 else 'hulls'}"
 
 
-def _solid(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     if analysis.convex:
-        return _hull(mesh, analysis, thickness)
+        return _hull(mesh, analysis, thickness, work)
     if not analysis.solid:
-        shape = _surface(mesh, analysis, thickness)
+        shape = _surface(mesh, analysis, thickness, work)
         why = "no winding tells its sides apart" if analysis.closed else "the mesh is open and has no inside"
         return replace(shape, needs_containment=analysis.closed, note=f"{why}: {shape.note}")
-    whole = _convex_solids(analysis)
+    whole = _convex_solids(analysis, work)
     hulls = tuple(
         hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
         for c in np.flatnonzero(whole)
@@ -177,7 +181,7 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
     rest = np.flatnonzero(~whole[analysis.component])
     if len(rest) == 0:
         return CollisionShape(mesh, "hull", hulls, False, analysis, _hulled(hulls))
-    lining = shells(analysis, rest, thickness)
+    lining = shells(analysis, rest, thickness, work)
     note = _shell_note(lining, analysis.component_volumes[~whole].sum())
     return CollisionShape(
         mesh=mesh,
@@ -199,11 +203,11 @@ def _shell_note(lining: Shells, volume: float) -> str:
     )
 
 
-def _coacd(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
+def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     if analysis.convex:
-        return _hull(mesh, analysis, thickness)
+        return _hull(mesh, analysis, thickness, work)
     if analysis.flat:
-        return _surface(mesh, analysis, thickness)
+        return _surface(mesh, analysis, thickness, work)
     parts = approximate_parts(analysis.vertices, analysis.faces)
     pieces = tuple(hull_piece(part, thickness) for part in parts)
     return CollisionShape(
@@ -211,7 +215,7 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float) -> CollisionShape:
     )
 
 
-def _convex_solids(analysis: Analysis) -> Bools:
+def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     """Tell which components are convex solids without a cavity in them, (c,).
 
     A solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
@@ -227,6 +231,7 @@ def _convex_solids(analysis: Analysis) -> Bools:
     size = np.linalg.norm(high - low, axis=1)
     volumes = analysis.component_volumes
     cavities = volumes <= RELATIVE_TOLERANCE * size**3
+    work.spend(int(cavities.sum()) * int((~cavities).sum()))
     for c in np.flatnonzero(~cavities):
         if not _apart(low[c], high[c], low[cavities], high[cavities]):
             continue
@@ -243,7 +248,7 @@ def _count(n: int, noun: str) -> str:
     return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
-_STRATEGIES: dict[str, Callable[[Mesh, Analysis, float], CollisionShape]] = {
+_STRATEGIES: dict[str, Callable[[Mesh, Analysis, float, Work], CollisionShape]] = {
     "auto": _solid,
     "hull": _hull,
     "solid": _solid,

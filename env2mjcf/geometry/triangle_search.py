@@ -9,11 +9,14 @@ import numpy as np
 from .topology import Bools, Floats, Ints
 from .triangle_distance import nearest
 from .triangle_tree import Forest
+from .work import COSTLY, Work
 
 # Pairs of triangles whose exact distance is taken at once: the first ones tighten the bound for the others.
 _BLOCK = 512
 # Where more pairs of nodes than this are left, a few triangles of each group are looked at before going deeper.
 _MANY = 256
+# Pairs of nodes whose boxes are held in memory at once.
+_PAIRS = 1 << 17
 _PROBES = 4
 
 
@@ -96,16 +99,23 @@ class Search:
         job, a, b = self._where.T
         return Closest(self._distance, job, a, b, touching)
 
-    def within(self, reach: float) -> Ints:
-        """Return job and triangles, (k, 3), of all pairs of triangles that may be within reach; not pruned further."""
+    def within(self, reach: float, work: Work | None = None) -> Ints:
+        """Return job and triangles, (k, 3), of all pairs of triangles that may be within reach; not pruned further.
+
+        Raises:
+            TooMuchWorkError: More nodes must be looked at than `work` has left.
+        """
+        work = work or Work()
         trees, jobs = self._trees, self._jobs
         job = np.arange(len(jobs.a), dtype=np.int64)
         a, b = trees.roots[jobs.a], trees.roots[jobs.b]
         while True:
-            kept = self._bounds(job, a, b)[0] <= reach
+            blocks = (slice(i, i + _PAIRS) for i in range(0, max(1, len(job)), _PAIRS))
+            kept = np.concatenate([self._bounds(job[i], a[i], b[i])[0] <= reach for i in blocks])
             job, a, b = job[kept], a[kept], b[kept]
             if not (trees.children[a].any() or trees.children[b].any()):
                 return np.stack([job, trees.triangle[a], trees.triangle[b]], axis=1)
+            work.spend(COSTLY * int((np.maximum(trees.children[a], 1) * np.maximum(trees.children[b], 1)).sum()))
             job, a, b = opened(trees, job, a, b)
 
     def _bounds(self, job: Ints, a: Ints, b: Ints) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from ..analysis import Analysis
 from ..pieces import SLENDEREST, ConvexPiece, prisms, too_narrow
 from ..polygons import Polygon, convex_polygons
 from ..topology import Ints
+from ..work import Work
 from .corners import cell_corners
 from .doubts import doubtful_polygons
 from .pairing import pair_sides
@@ -53,30 +54,35 @@ class Shells:
     missing: tuple[Polygon, ...]
 
 
-def shells(analysis: Analysis, faces: Ints, thickness: float) -> Shells:
+def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None = None) -> Shells:
     """Line the inside of a closed surface with convex cells, which overlap at its convex edges.
 
     Args:
         analysis: Of a `solid` mesh.
         faces: (k,) rows of `analysis.faces` to be lined.
         thickness: Height of the prisms where there is no room for a cell.
+        work: What may be done; None sets no bound.
+
+    Raises:
+        TooMuchWorkError: It takes more.
     """
+    work = work or Work()
     vertices, chosen = analysis.vertices, analysis.faces[faces]
     nothing = _EXACT * analysis.diagonal
     polygons = convex_polygons(vertices, chosen, nothing)
     normals = np.empty((len(chosen), 3))
     for polygon in polygons:
         normals[list(polygon.faces)] = polygon.normal
-    sides = pair_sides(vertices, chosen, normals)
+    sides = pair_sides(vertices, chosen, normals, work)
     solid = np.where(analysis.component_volumes > 0, np.arange(analysis.components), -1)[analysis.component]
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
-    around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing)
+    around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing, work)
     found: list[tuple[_Cell, ...]] = [()] * len(polygons)
     for group in groups(vertices, chosen, polygons, sides.slopes, THICKEST * analysis.diagonal):
         for number, cells in _fitted(group, around, polygons, analysis, thickness):
             found[number] = cells
     pieces = [[cell.piece for cell in cells] for cells in found]
-    doubtful = doubtful_polygons(analysis, polygons, pieces, sides, thickness)
+    doubtful = doubtful_polygons(analysis, polygons, pieces, sides, thickness, work)
     bare, standing = list(doubtful), list(doubtful.values())
     pins = {id(p.polygon): p for p in prisms(vertices, standing, thickness, inward=True)}
     for i, polygon in zip(bare, standing, strict=True):

@@ -12,6 +12,7 @@ from ..orientation import winding_numbers
 from ..pieces import ConvexPiece
 from ..polygons import Polygon
 from ..topology import Floats, Ints, connected
+from ..work import Work
 from .pairing import Sides
 
 
@@ -21,6 +22,7 @@ def doubtful_polygons(
     cells: Sequence[Sequence[ConvexPiece]],
     sides: Sides,
     thickness: float,
+    work: Work,
 ) -> dict[int, Polygon]:
     """Return the polygons that no cell may stand for, by number; turned round where the solid is on the other side.
 
@@ -34,6 +36,7 @@ def doubtful_polygons(
         cells: The cells of each polygon; none where there was no room.
         sides: How faces are paired at their edges.
         thickness: Depth at which polygons without a cell are asked.
+        work: What may be done.
     """
     # A surface that passes through itself, or touches itself, leaves no room for some cell, or cuts it.
     suspect = sides.folded or any(len(own) != 1 for own in cells)
@@ -41,12 +44,12 @@ def doubtful_polygons(
     some = range(len(cells)) if suspect else np.unique(patch, return_index=True)[1].tolist()
     asked = [(i, cell) for i in some for cell in cells[i]]
     insides = np.reshape([cell.center for _, cell in asked], (-1, 3))
-    outside = ~_inside(analysis, insides)
+    outside = ~_inside(analysis, insides, work)
     wrong = patch[[i for (i, _), out in zip(asked, outside.tolist(), strict=True) if out]]
     doubtful = [i for i, own in enumerate(cells) if not own or patch[i] in wrong]
     middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
-    turn = ~_inside(analysis, middles - step) & _inside(analysis, middles + step)
+    turn = ~_inside(analysis, middles - step, work) & _inside(analysis, middles + step, work)
     return {
         i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal) if t else polygons[i]
         for i, t in zip(doubtful, turn.tolist(), strict=True)
@@ -61,5 +64,5 @@ def _patches(polygons: Sequence[Polygon], links: Ints) -> Ints:
     return connected(len(polygons), of_face[links[:, 0]], of_face[links[:, 1]])
 
 
-def _inside(analysis: Analysis, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5
+def _inside(analysis: Analysis, points: Floats, work: Work) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces, work)) > 0.5

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..topology import Floats, Ints, edges
+from ..work import Work
 
 # Angles in radians below which two faces coincide: the solid that touches here is another one.
 _COINCIDENT = 1e-6
@@ -31,7 +32,7 @@ class Sides:
     folded: bool
 
 
-def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
+def pair_sides(vertices: Floats, faces: Ints, normals: Floats, work: Work | None = None) -> Sides:
     """Find the partner of each face at each of its edges, and how the cell's side leans there.
 
     At a convex edge the side lies in the partner's face, and leans outward at an obtuse one, so that the cell fills
@@ -46,8 +47,13 @@ def pair_sides(vertices: Floats, faces: Ints, normals: Floats) -> Sides:
         vertices: (n, 3).
         faces: (m, 3) counter-clockwise from outside.
         normals: (m, 3) unit normals.
+        work: What may be done; None sets no bound.
+
+    Raises:
+        TooMuchWorkError: So many faces meet at edges that it takes more.
     """
     table = edges(faces)
+    (work or Work()).spend(int((table.faces**2).sum()))
     corner = np.argsort(table.of_corner.ravel(), kind="stable")
     start = np.concatenate([[0], np.cumsum(table.faces)[:-1]]).astype(np.int64)
     along = vertices[faces[:, (1, 2, 0)]] - vertices[faces]

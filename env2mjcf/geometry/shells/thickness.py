@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..topology import Bools, Floats, Ints
+from ..work import COSTLY, Work
 from .clipping import clipped
 from .neighbours import near
 from .walls import Group
@@ -25,12 +26,14 @@ class Surroundings:
         blocking: (m,) number of the solid that a triangle bounds; -1 for a cavity, which blocks every cell.
         kind: (p,) number of the solid that each polygon is of; -1 for cavities, whose cells every triangle blocks.
         margin: Length by which a triangle may reach through a cell's top or bottom without being there.
+        work: What may be done to find it out.
     """
 
     triangles: Floats
     blocking: Ints
     kind: Ints
     margin: float
+    work: Work
 
 
 def fit(group: Group, around: Surroundings) -> None:
@@ -66,7 +69,7 @@ def within(group: Group, around: Surroundings) -> Floats:
 def _near(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
     """Return the pairs of cells and triangles that may meet and matter."""
     low, high = group.boxes()
-    cell, other = near(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1))
+    cell, other = near(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1), around.work)
     kind, blocking = around.kind[group.members][cell], around.blocking[other]
     matters = (kind < 0) | (blocking < 0) | (kind == blocking)
     return cell[matters], other[matters]
@@ -77,6 +80,7 @@ def pieces(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Itera
     step = max(1, _NUMBERS // (3 * (group.corners.shape[1] + 2)))
     for i in range(0, len(cell), step):
         c, t = cell[i : i + step], other[i : i + step]
+        around.work.spend(COSTLY * len(c))
         local = around.triangles[t] - group.centers[c, None]
         planes = group.planes(c, around.margin)
         chosen = np.flatnonzero(~_behind_a_plane(local, planes))
