@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from . import starting as _starting
+
+if _starting.is_program():
+    _starting.end_at_once()
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

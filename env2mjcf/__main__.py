@@ -1,8 +1,22 @@
-"""Runs the command line: `python -m env2mjcf`."""
+"""Runs the command line: `python -m env2mjcf`, and the program `env2mjcf`."""
 
 import sys
 
-from .cli.main import main
+from . import starting
+
+
+def run() -> int:
+    """Run the program, and return its exit status."""
+    try:
+        from .cli.main import main
+
+        return main()
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        # All is done; what the interpreter tidies up is no place for a traceback.
+        starting.end_at_once()
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run())

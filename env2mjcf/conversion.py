@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,12 +14,10 @@ from .errors import ConversionError, Diagnostic, DiagnosticLog
 from .model import Environment
 from .options import Options, PathArgument
 from .report import Report
+from .scene_folder import PATIENCE, FolderBusyError, Staged
 from .simulation.loading import load_file
 from .simulation.preparing import prepare
 from .simulation.scene import Scene
-from .writing import replaced
-
-_ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +43,8 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
     """Convert a scene to MJCF.
 
     Assets are written first, the MJCF file is checked by loading it, and renamed into place last: until then the
-    folder holds the scene that it held before. Assets that only the previous scene used are then removed.
+    folder holds the scene that it held before. Assets that only the previous scene used are then removed; so is, after
+    an hour, what a killed process left there. Several processes may convert to one folder: the last one's scene stays.
 
     Args:
         path: An env file of any dialect, an XML environment, or the planner's problem XML.
@@ -74,9 +72,9 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
 
 def _refuse_foreign(final: Path, log: DiagnosticLog) -> None:
     """Refuse to replace a file that is no MJCF, such as the XML environment that is being converted."""
-    if not final.is_file():
+    if not final.exists():
         return
-    text = re.sub(r"<\?.*?\?>|<!--.*?-->", "", final.read_text(encoding="utf-8", errors="replace"), flags=re.DOTALL)
+    text = re.sub(r"<\?.*?\?>|<!--.*?-->", "", _text(final), flags=re.DOTALL)
     if not text.lstrip().startswith("<mujoco"):
         log.fail(
             ConversionError, "MJC423", str(final), f"{final} is no MJCF, and is not replaced",
@@ -84,47 +82,21 @@ def _refuse_foreign(final: Path, log: DiagnosticLog) -> None:
         )  # fmt: skip
 
 
+def _text(path: Path) -> str:
+    # Devices and pipes may never end.
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
 def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[Path, ...]:
     document = scene.compiled.document
-    final = folder / f"{name}.xml"
-    (folder / "assets").mkdir(parents=True, exist_ok=True)
-    before = _named_assets(final)
-    staged = folder / f".{name}-{secrets.token_hex(8)}.xml"
-    made: list[Path] = []
+    staged = Staged(folder, name, document.xml.encode("utf-8"), document.assets)
     try:
-        for relative, data in document.assets.items():
-            path = folder / relative
-            # The name holds the hash of the content: what is there and whole is right.
-            if not path.exists() or path.stat().st_size != len(data):
-                with replaced(path) as beside:
-                    beside.write_bytes(data)
-                made.append(path)
-        staged.write_bytes(document.xml.encode("utf-8"))
-        load_file(staged, document, scene.compiled.assembly, log)
-        os.replace(staged, final)
+        load_file(staged.path, document, scene.compiled.assembly, log)
+        staged.commit()
     except BaseException:
-        staged.unlink(missing_ok=True)
-        _remove(folder, {p.name for p in made})
+        staged.discard()
         raise
-    written = tuple(folder / relative for relative in document.assets)
-    _remove(folder, before - {p.name for p in written})
-    return written
-
-
-def _remove(folder: Path, names: set[str]) -> None:
-    """Remove assets that no scene of the folder names."""
-    for scene in folder.glob("*.xml"):
-        names = names - _named_assets(scene)
-    for name in names:
-        (folder / "assets" / name).unlink(missing_ok=True)
-
-
-def _named_assets(xml: Path) -> set[str]:
-    """Return the asset files that an earlier conversion's MJCF names."""
-    try:
-        return set(_ASSET.findall(xml.read_text(encoding="utf-8", errors="replace")))
-    except FileNotFoundError:
-        return set()
+    return staged.assets
 
 
 @contextmanager
@@ -138,10 +110,19 @@ def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
             str(folder),
             f"{folder} is, or lies under, a file; expected a folder to write to",
         )
+    except FolderBusyError:
+        log.fail(
+            ConversionError, "MJC424", str(folder),
+            f"another process has kept {folder} locked for {PATIENCE:g} seconds",
+            hint="is one stopped in the middle of writing there? End it, or choose another output folder",
+        )  # fmt: skip
     except PermissionError as error:
         log.fail(
             ConversionError, "MJC420", str(folder), f"{error.filename or folder} may not be written",
             hint="choose another output folder, or change its permissions",
         )  # fmt: skip
     except OSError as error:
-        log.fail(ConversionError, "MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}")
+        log.fail(
+            ConversionError, "MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}",
+            hint="choose another output folder, or make room",
+        )  # fmt: skip

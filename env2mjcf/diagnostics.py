@@ -183,6 +183,7 @@ CATALOGUE: dict[str, str] = {
     "MJC421": "A file stands where the output folder should be.",
     "MJC422": "The output cannot be written.",
     "MJC423": "A file that is no MJCF stands where the MJCF would be written; it is kept.",
+    "MJC424": "Another process keeps the output folder locked.",
     # Configurations and queries.
     "CFG501": "Text ends the list of configurations of a query.",
     "CFG502": "A word in a row of configurations is not a finite number.",
@@ -222,7 +223,9 @@ CATALOGUE: dict[str, str] = {
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",
+    "CFG543": "Nothing moves in a scene, so that it has no configurations, paths or plans.",
     "CFG550": "Configurations of a path to be shown are beyond the limits; its units may be others.",
     "CFG551": "A path to be shown holds one configuration only.",
     "CFG552": "A picture or film cannot be written.",
+    "CFG553": "A file that is no path stands where a path would be written; it is kept.",
 }

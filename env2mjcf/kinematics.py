@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .dofs import Dof, DofKind, Tree, build_tree, degrees_of_freedom
 from .errors import DiagnosticLog, KinematicsError
+from .forking import lasting
 from .model import BaseKind, DHForm, Dialect, MultiBody, Pose
 from .transforms import Array, dh_matrix, inverse, pose_matrix, rotation_matrix, transform, wrap
 
@@ -185,7 +185,7 @@ class RobotKinematics:
         rotation = rotation_matrix(*(value.get(k, zeros) for k in _ROTATIONS))
         return transform(rotation, np.stack([value.get(k, zeros) for k in _POSITIONS], axis=-1))
 
-    @cached_property
+    @lasting
     def _columns(self) -> dict[tuple[int, DofKind], int]:
         return {(d.connection, d.kind): i for i, d in enumerate(self.dofs) if d.connection is not None}
 

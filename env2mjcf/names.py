@@ -9,13 +9,33 @@ from pathlib import PurePosixPath
 from .dofs import Dof
 from .model import Environment, MultiBody
 
-# Control characters cannot stand in XML; '/' and ':' are separators in MuJoCo names of this project.
-_UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f/:\s\ud800-\udfff]+|[^\x00-\uffff]")
+# '/' and ':' are separators in MuJoCo names of this project; '\0' stands for what cannot be seen.
+_UNFIT = re.compile(r"[\0/:\s]+|[^\x00-\uffff]")
+# What file systems and shells give a meaning to.
+_UNFIT_IN_FILES = re.compile(r'[\0<>:"/\\|?*]+')
+_RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)(?= *(?:\.|$))", re.IGNORECASE)
+# File systems take 255; what is written beside a file before it gets its name adds some thirty.
+_LONGEST_STEM = 160
 
 
 def mesh_stem(filename: str) -> str:
     """Return the stem of a mesh file's name, fit for a name."""
-    return _UNFIT.sub("_", PurePosixPath(filename.replace("\\", "/")).stem) or "body"
+    return _UNFIT.sub("_", _seen(PurePosixPath(filename.replace("\\", "/")).stem)) or "body"
+
+
+def file_stem(name: str) -> str:
+    """Return a name fit for a file on every system, without an extension.
+
+    What is no part of a name, or cannot be seen, becomes `_`; names that Windows reserves, and a dot, blank or dash in
+    front, get one before them; it has 160 bytes at most, and no dot or blank at its end.
+    """
+    stem = _UNFIT_IN_FILES.sub("_", _seen(name)).encode()[:_LONGEST_STEM].decode(errors="ignore").rstrip(". ")
+    return f"_{stem}" if stem[:1] in ("", ".", "-", " ") or _RESERVED.match(stem) else stem
+
+
+def _seen(text: str) -> str:
+    """Return text with a NUL for what cannot be seen: control characters, turns of direction, undecodable bytes."""
+    return "".join(c if c.isprintable() else "\0" for c in text)
 
 
 def unique(stems: Iterable[str]) -> list[str]:

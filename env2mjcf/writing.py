@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from .errors import ConversionError, DiagnosticLog
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -15,12 +20,45 @@ def replaced(file: str | os.PathLike[str]) -> Generator[Path]:
 
     Yields:
         The path to write to; it ends as the file does.
+
+    Raises:
+        OSError: It cannot be written, or something stands there that is no regular file, such as a device.
     """
     path = Path(os.fsdecode(file))
+    if "\0" in path.name:
+        raise OSError(errno.EINVAL, "its name holds a NUL character", str(path))
+    # Renaming would put a file in the place of /dev/null.
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
     beside = path.with_name(f".{secrets.token_hex(8)}-{path.name}")
     try:
         yield beside
         os.replace(beside, path)
     except BaseException:
-        beside.unlink(missing_ok=True)
+        # What went wrong is worth more than what this would say.
+        with suppress(OSError):
+            beside.unlink()
         raise
+
+
+@contextmanager
+def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
+    """Let a file be written as `replaced` does, and say what the system has against it.
+
+    Args:
+        file: The file to write.
+        code: The code of the diagnostic.
+
+    Raises:
+        ConversionError: It cannot be written.
+    """
+    try:
+        with replaced(file) as beside:
+            yield beside
+    except OSError as error:
+        path = os.fsdecode(file)
+        full = error.errno in _FULL
+        DiagnosticLog().fail(
+            ConversionError, code, path, f"{path} cannot be written: {error.strerror or error}",
+            hint=f"{'make room, or ' if full else ''}choose another file; its folder must exist",
+        )  # fmt: skip

@@ -113,7 +113,7 @@ def _only_ours(read: Callable[[bytes], None]) -> Callable[[bytes], None]:
         try:
             read(data)
         except Env2MjcfError as error:
-            if not str(error):
+            if not error.diagnostic.message:
                 raise AssertionError("an error without a message") from error
 
     return run

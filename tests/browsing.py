@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from extras import skip_without
 
 ROOT = Path(__file__).parents[1]
 # Drawn in software, without a screen, and without asking anybody for anything.
@@ -40,6 +41,7 @@ needs_chromium = pytest.mark.skipif(
 @contextmanager
 def viewing(*arguments: str | Path) -> Iterator[str]:
     """Run `env2mjcf view`, and give the address that it prints; Ctrl-C must end it with status 0."""
+    skip_without("view")
     command = [sys.executable, "-m", "env2mjcf", "view", *map(str, arguments), "--no-browser"]
     process = subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"

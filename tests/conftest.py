@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from texts import read, read_robot  # noqa: F401  fixtures
+
+# What is hidden from this process is hidden from its children too.
+if os.environ.get("ENV2MJCF_TEST_WITHOUT"):
+    _hiding = Path(__file__).with_name("without")
+    runpy.run_path(str(_hiding / "sitecustomize.py"))
+    os.environ["PYTHONPATH"] = os.pathsep.join(p for p in (str(_hiding), os.environ.get("PYTHONPATH", "")) if p)
 
 _FOLDER = os.environ.get("ENV2MJCF_CORPUS")
 CORPUS: Path | None = Path(_FOLDER) if _FOLDER else None

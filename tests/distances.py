@@ -1,13 +1,18 @@
-"""Distances of triangle meshes by other programs: coal and python-fcl."""
+"""Distances of triangle meshes by other programs: coal and python-fcl.
+
+A test that asks for one that is not there is skipped, and no other one.
+"""
 
 from __future__ import annotations
 
-import coal
-import fcl
+from typing import Any
+
 import numpy as np
+import pytest
 
 
-def coal_model(vertices: np.ndarray, faces: np.ndarray) -> coal.BVHModelOBBRSS:
+def coal_model(vertices: np.ndarray, faces: np.ndarray) -> Any:
+    coal = pytest.importorskip("coal", reason="no coal to compare with")
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(faces), len(vertices))
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
@@ -20,15 +25,16 @@ def coal_model(vertices: np.ndarray, faces: np.ndarray) -> coal.BVHModelOBBRSS:
     return model
 
 
-def coal_distance(a: coal.BVHModelOBBRSS, pose_a: np.ndarray, b: coal.BVHModelOBBRSS, pose_b: np.ndarray) -> float:
+def coal_distance(a: Any, pose_a: np.ndarray, b: Any, pose_b: np.ndarray) -> float:
     """Return the distance of surfaces; not above zero where they cross."""
+    coal = pytest.importorskip("coal", reason="no coal to compare with")
     frames = [coal.Transform3s(p[:3, :3].copy(), p[:3, 3].copy()) for p in (pose_a, pose_b)]
     return coal.distance(a, frames[0], b, frames[1], coal.DistanceRequest(), coal.DistanceResult())
 
 
 def fcl_distance(a: np.ndarray, b: np.ndarray) -> float:
     """Return the distance of two triangle soups (m, 3, 3) in one frame; not above zero where they cross."""
-    objects = []
+    fcl, objects = pytest.importorskip("fcl", reason="no python-fcl to compare with"), []
     for triangles in (a, b):
         model = fcl.BVHModel()
         model.beginModel(3 * len(triangles), len(triangles))

@@ -139,7 +139,7 @@ def test_a_cut_problem_is_ill_formed_until_its_problem_is_whole(folder: Path) ->
 
 
 @pytest.mark.skipif(not CORPUS_TEXTS, reason="ENV2MJCF_CORPUS does not name the folder of real scenes")
-@pytest.mark.parametrize("path", CORPUS_TEXTS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", CORPUS_TEXTS, ids=[p.stem for p in CORPUS_TEXTS])
 def test_no_cut_of_a_real_file_reads_silently_as_another(folder: Path, path: Path) -> None:
     text = path.read_bytes().decode("latin-1")
     whole = env2mjcf.read(write(folder, text, "scene.env"))

@@ -411,6 +411,33 @@ class TestExitStatus:
             assert re.match(r"bad\.env:5:1: error ENV\d{3}: ", line)
             assert (source, caret) == ("    Wheel 1 cube.g", "    ^^^^^")
 
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ("plan", "e.env"), ("plan", "e.env", "--query", "q"), ("play", "e.env", "q", "-o", "a.gif"),
+            ("view", "e.env", "--path", "q", "--no-browser"),
+        ],
+    )  # fmt: skip
+    def test_a_scene_in_which_nothing_moves_is_3_and_said_to_be_one(self, words, folder, run):
+        (folder / "e.env").write_text("Boundary Box [-9:9; -9:9; -9:9]\nMultibodies\n1\nPassive\ncube.g 0 0 0 0 0 0\n")
+        (folder / "q").write_text("1 2 3\n")
+        result = run(*words)
+        assert (result.status, result.out) == (3, "")
+        if "q" not in words or words[0] != "plan":
+            assert "error CFG543: e.env has no robot" in result.err
+
+    @pytest.mark.parametrize("words", [("check", "d.env", "1", "2"), ("info", "d.env", "--scale", "0"), ("nothing",)])
+    def test_wrong_usage_leaves_stdout_empty_with_json_too(self, words, folder, run):
+        result = run(*words, "--json")
+        assert (result.status, result.out) == (2, "")
+        assert result.err
+
+    def test_json_of_check_holds_the_diagnostics(self, folder, run):
+        (folder / "d.env").write_text(DIALECT_D.replace("Multibodies", "Multibodys"))
+        (found,) = run("check", "d.env", "--json").json["diagnostics"]
+        assert found["code"] == "ENV202"
+        assert found == run("info", "d.env", "--json").json["diagnostics"][0]
+
     def test_a_missing_file_is_3(self, folder, run):
         result = run("convert", "b.env")
         assert result.status == 3

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -218,6 +221,40 @@ def test_a_roadmap_of_wrong_shapes_is_refused() -> None:
         Roadmap.of(np.zeros((2, 3)), [[0, 1]], weights=[1, 2])
     with pytest.raises(ValueError, match=r"expected \(n, dim\)"):
         Roadmap.of(np.zeros(3), [])
+
+
+@pytest.mark.parametrize(
+    ("edges", "more", "message"),
+    [
+        ([[0, 1.5]], {}, "whole numbers"),
+        ([[0, 0]], {}, "from a node to itself"),
+        ([[0, 1], [1, 0]], {}, "twice"),
+        ([0, 1], {}, r"expected \(m, 2\)"),
+        ([[0, 1]], {"weights": [math.nan]}, "not finite"),
+        ([[0, 1]], {"robot": -1}, "robot is -1"),
+    ],
+)
+def test_a_roadmap_that_no_reader_would_give_back_is_refused(
+    edges: list[Any], more: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        Roadmap.of(np.zeros((2, 3)), edges, **more)
+
+
+def test_nothing_is_written_that_no_reader_reads(tmp_path: Path) -> None:
+    scene = load(tmp_path, SCENES["D"])
+    with pytest.raises(ValueError, match="no configuration"):
+        env2mjcf.write_query(scene, [], tmp_path / "a.query")
+    with pytest.raises(ValueError, match="no configuration"):
+        env2mjcf.write_query(scene, Query(0, np.zeros((0, 6))), tmp_path / "a.query")
+    far = np.zeros((1, 6))
+    far[0, 0] = 1e101
+    with pytest.raises(ValueError, match=r"numbers up to 1e\+100"):
+        env2mjcf.write_path(scene, far, tmp_path / "a.path")
+    good = Roadmap.of(np.zeros((2, 6)), [[0, 1]])
+    with pytest.raises(ValueError, match="weights"):
+        env2mjcf.write_roadmap(scene, dataclasses.replace(good, weights=np.array([math.nan])), tmp_path / "a.map")
+    assert not list(tmp_path.glob("a.*"))
 
 
 def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ DOUBTFUL = {
 }
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", TEXTS, ids=[p.stem for p in TEXTS])
 def test_every_text_reads(path: Path) -> None:
     scene = env2mjcf.read(path)
     assert {d.code for d in scene.diagnostics if d.severity is Severity.WARNING} <= set(DOUBTFUL)
@@ -30,7 +30,7 @@ def test_every_text_reads(path: Path) -> None:
     assert honest == (len(scene.multibodies) == scene.declared_multibodies)
 
 
-@pytest.mark.parametrize("real", real_scenes(), ids=lambda r: r.name)
+@pytest.mark.parametrize("real", real_scenes(), ids=[r.name for r in real_scenes()])
 def test_every_scene_reads_as_it_is_known(real: RealScene) -> None:
     scene = env2mjcf.read(real.env, **real.keywords)
     assert scene.dialect == real.dialect

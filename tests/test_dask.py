@@ -17,7 +17,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.cli.main import main
 
-distributed = pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed", reason="no distributed: pip install 'env2mjcf[dask]'")
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from pathlib import Path
 
 import mujoco
 import pytest
+from extras import needs
 from meshes import box, channel, grid, joined
 from scenes import MODELS
 
@@ -21,7 +21,7 @@ from env2mjcf.geometry.decompose import approximate_parts
 from env2mjcf.geometry.shapes import collision_shape
 
 ALPHA = MODELS / "alpha" / "alpha.env"
-needs_coacd = pytest.mark.skipif(importlib.util.find_spec("coacd") is None, reason="needs the extra decompose")
+needs_coacd = needs("decompose")
 
 
 def shape(mesh, cache: GeometryCache | None = None):

@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from extras import needs
 
 from env2mjcf.view import offscreen
 
@@ -32,8 +33,9 @@ def demo(out: Path, *arguments: str, **environment: str) -> str:
 
 def pixels(picture: Path) -> np.ndarray:
     """Return a picture, (height, width, 3)."""
-    image = pytest.importorskip("PIL.Image")
-    with image.open(picture) as opened:
+    from PIL import Image
+
+    with Image.open(picture) as opened:
         assert opened.format == "PNG"
         return np.array(opened.convert("RGB"), dtype=np.int64)
 
@@ -71,6 +73,7 @@ def test_the_demo_reports_what_plain_mujoco_finds(tmp_path: Path) -> None:
 
 
 @needs_gl
+@needs("view")
 def test_the_demo_draws_robot_and_obstacles(tmp_path: Path) -> None:
     picture = tmp_path / "seed.png"
     text = demo(tmp_path / "demo", "--picture", str(picture))

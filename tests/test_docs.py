@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from extras import skip_without
 from snippets import RUN, SHOWN, blocks, commands
 
 import env2mjcf
@@ -18,6 +19,14 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(p for p in DOCS.rglob("*.md") if "_build" not in p.parts)
 WITH_EXAMPLES = [p for p in PAGES if any(b.language in RUN for b in blocks(p.read_text(encoding="utf-8")))]
+# What the examples of a page cannot do without.
+EXTRAS = {
+    "cluster.md": ("dask",),
+    "engines.md": ("fast",),
+    "pictures.md": ("view",),
+    "planning.md": ("planning",),
+    "tutorial.md": ("fast", "view", "planning"),
+}
 TUTORIAL = DOCS / "tutorial.md"
 
 
@@ -27,6 +36,8 @@ def name(page: Path) -> str:
 
 def follow(page: Path, folder: Path) -> None:
     """Run a page's examples in a folder, in a process of their own, and fail with what differs."""
+    for extra in EXTRAS.get(page.name, ()):
+        skip_without(extra)
     words = [sys.executable, str(ROOT / "tests" / "snippets.py"), str(page)]
     # Whatever make thinks, it must not install the clone into the environment that it only borrows.
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MAKEFLAGS": "PIP=true"}
@@ -45,6 +56,8 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a checkout of git")
 def test_a_newcomer_gets_through_the_tutorial(tmp_path: Path) -> None:
+    for extra in EXTRAS[TUTORIAL.name]:
+        skip_without(extra)
     clone = tmp_path / "env2mjcf"
     subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
     install(clone)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from extras import needs
 from meshes import channel
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from truth import Truth, bisected, near_obstacles
@@ -17,7 +18,7 @@ import env2mjcf
 import env2mjcf.contact.exact.engine as exact_engine
 from env2mjcf.formats.byu import export_byu
 
-pytest.importorskip("numba")
+needs_numba = needs("fast")
 
 # With obstacles, and with a free side to bisect from.
 SCENES = ("alpha/alpha", "bug-trap/bug-trap", "maze/maze", "spherical-arm/spherical-arm", "two-robots/two-robots")
@@ -37,6 +38,7 @@ def rows(scene: env2mjcf.Scene, count: int, seed: int) -> np.ndarray:
     return np.concatenate([scene.space.sample(count, seed), near_obstacles(scene, count, seed)])
 
 
+@needs_numba
 class TestVerdicts:
     def test_are_those_of_the_triangles(self, model: env2mjcf.Scene) -> None:
         truth = Truth(model)
@@ -116,9 +118,10 @@ _OCTAHEDRON = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -
 _FACES = "1 3 -5\n3 2 -5\n2 4 -5\n4 1 -5\n3 1 -6\n2 3 -6\n4 2 -6\n1 4 -6\n"
 
 
+@needs_numba
 class TestClearance:
     def test_is_that_of_coal(self, model: env2mjcf.Scene) -> None:
-        coal = pytest.importorskip("coal")
+        coal = pytest.importorskip("coal", reason="no coal to compare with")
         parts = {p.name: p for p in model.compiled.assembly.parts()}
         meshes = {}
         for name in {n for pair in model.pairs for n in pair}:
@@ -159,6 +162,7 @@ class TestClearance:
         np.testing.assert_allclose(model.clearance(q), arrays, atol=1e-9 * model.extent)
 
 
+@needs_numba
 class TestEdges:
     def test_hit_where_one_of_their_steps_does(self, model: env2mjcf.Scene) -> None:
         q0, q1 = rows(model, 60, 10), rows(model, 60, 11)
@@ -231,6 +235,7 @@ class TestEngines:
         with pytest.raises(ValueError, match=r"pip install 'env2mjcf\[fast\]'"):
             load("maze/maze", engine="exact")
 
+    @needs_numba
     def test_nothing_imports_numba_before_it_is_needed(self) -> None:
         code = (
             "import sys, env2mjcf\n"
@@ -241,18 +246,21 @@ class TestEngines:
         )
         subprocess.run([sys.executable, "-c", code], check=True)
 
+    @needs_numba
     def test_a_warm_scene_says_how_long_it_took(self) -> None:
         scene = load("maze/maze")
         assert scene.warm_up() > 0
         assert scene.warm_up() < 0.1
         assert load("maze/maze").warm_up(wait=False) == 0.0
 
+    @needs_numba
     def test_the_command_line_compiles_ahead(self, capsys: pytest.CaptureFixture[str]) -> None:
         from env2mjcf.cli.main import main
 
         assert main(["cache", "warm"]) == 0
         assert capsys.readouterr().out.startswith("the exact engine is ready")
 
+    @needs_numba
     def test_what_is_kept_on_disk_belongs_to_these_sources(self) -> None:
         from env2mjcf.contact.exact.kernels import compiling, entries
 

@@ -16,7 +16,7 @@ from env2mjcf.geometry.orientation import winding_numbers
 from env2mjcf.geometry.triangle_distance import nearest
 from env2mjcf.transforms import rotation_matrix, transform
 
-pytest.importorskip("numba")
+pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
 
 from env2mjcf.contact.exact.kernels.boxes import boxes_apart, lanes_near
 from env2mjcf.contact.exact.kernels.insides import _LEAN_X, _LEAN_Y, holds
@@ -95,7 +95,7 @@ def test_distances_of_triangles_are_those_of_the_library_of_arrays() -> None:
 
 def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
     """Against python-fcl, whose box is solid too."""
-    fcl = pytest.importorskip("fcl")
+    fcl = pytest.importorskip("fcl", reason="no python-fcl to compare with")
     rng = np.random.default_rng(3)
     half = np.array([0.5, 0.8, 0.3])
     box = fcl.CollisionObject(fcl.Box(*(2 * half)), fcl.Transform())
@@ -115,7 +115,7 @@ def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
 
 
 def test_boxes_are_apart_as_fcl_says_and_lanes_agree() -> None:
-    fcl = pytest.importorskip("fcl")
+    fcl = pytest.importorskip("fcl", reason="no python-fcl to compare with")
     rng = np.random.default_rng(4)
     a, b = np.array([1.0, 0.4, 0.2]), np.array([0.3, 0.9, 0.5])
     row = np.zeros(48)

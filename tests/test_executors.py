@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import skip_without
 from scenes import free_cube, write_scene
 
 import env2mjcf
@@ -106,7 +107,7 @@ def test_packed_contacts_are_the_contacts_of_each_row(cubes: env2mjcf.Scene) -> 
 
 
 def test_the_exact_engine_answers_alike_in_another_process(tmp_path: Path) -> None:
-    pytest.importorskip("numba")
+    skip_without("fast")
     scene = env2mjcf.load(write_scene(tmp_path, free_cube("2 0 0 0 0 0", "-2 0 0 0 0 0")))
     q = near(scene, 20_000)
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:

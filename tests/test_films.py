@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from cameras import projected
+from extras import needs
 from scenes import free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.companions import read_path, write_path
 from env2mjcf.view import film, offscreen
+from env2mjcf.view.encoding import encoder
 from env2mjcf.view.trails import paced, reference_points
 
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")
+needs_view = needs("view")
 CORNERS = np.array([[x, y, z, 1] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 PATH = np.array([[-3, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 3.0], [3, 2, 0, 0, 0, -3.0]])
 
@@ -31,7 +36,8 @@ def cubes(tmp_path_factory: pytest.TempPathFactory) -> env2mjcf.Scene:
 
 def decoded(file: Path) -> tuple[dict, list[np.ndarray]]:
     """Return what a film's header says, and its pictures."""
-    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    import imageio_ffmpeg
+
     frames: Iterator = imageio_ffmpeg.read_frames(str(file))
     head = next(frames)
     width, height = head["size"]
@@ -45,6 +51,7 @@ def blue(picture: np.ndarray) -> np.ndarray:
 
 
 @needs_gl
+@needs_view
 def test_the_robot_in_a_film_follows_the_path(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     free = PATH[:2]
     made = film(cubes, free, tmp_path / "a.mp4", seconds=2, fps=10, size=(641, 481), camera="top", ghosts=False)
@@ -64,6 +71,7 @@ def test_the_robot_in_a_film_follows_the_path(cubes: env2mjcf.Scene, tmp_path: P
 
 
 @needs_gl
+@needs_view
 def test_what_touches_is_red_for_as_long_as_it_does(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     made = film(cubes, PATH, tmp_path / "a.mp4", seconds=2, fps=10, size=(320, 240), ghosts=False)
     np.testing.assert_array_equal(made.in_contact, cubes.in_collision(made.q))
@@ -73,8 +81,10 @@ def test_what_touches_is_red_for_as_long_as_it_does(cubes: env2mjcf.Scene, tmp_p
 
 
 @needs_gl
+@needs_view
 def test_a_gif_has_as_many_pictures(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
-    image = pytest.importorskip("PIL.Image")
+    from PIL import Image as image
+
     made = film(cubes, PATH, tmp_path / "a.gif", seconds=1.5, fps=10, size=(160, 120))
     with image.open(made.file) as opened:
         durations = []
@@ -104,13 +114,17 @@ def test_a_path_that_stands_still_is_a_still(cubes: env2mjcf.Scene) -> None:
     np.testing.assert_array_equal(q, PATH[[0] * 5])
 
 
+@needs_view
 @pytest.mark.parametrize(
     ("name", "arguments", "message"),
     [
         ("a.avi", {}, r"expected \.mp4 or \.gif"),
         ("a", {}, "ends in nothing"),
-        ("a.mp4", {"fps": 0}, "expected positive"),
-        ("a.mp4", {"seconds": -1.0}, "expected positive"),
+        ("a.mp4", {"fps": 0}, "^fps is 0; expected 1 to 1000$"),
+        ("a.gif", {"fps": 51}, r"^fps is 51; a \.gif has at most 50 pictures a second"),
+        ("a.mp4", {"seconds": -1.0}, "^seconds is -1.0; expected a positive"),
+        ("a.mp4", {"seconds": 1e15}, "^seconds is 1e.15, at 25 pictures a second; expected a film of at most 10000"),
+        ("a.mp4", {"size": (1, 1)}, "^size is 1 x 1 pixels; expected at least 2 x 2"),
     ],
 )
 def test_an_impossible_film_says_what_is_possible(
@@ -121,7 +135,48 @@ def test_an_impossible_film_says_what_is_possible(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"fps": math.nan}, "^fps is nan; expected a whole number"),
+        ({"fps": 12.5}, "^fps is 12.5; expected a whole number"),
+        ({"seconds": "3"}, "^seconds is '3'; expected a number"),
+        ({"size": "160x120"}, "^size is '160x120'; expected width and height"),
+        ({"size": (160.0, 120)}, "^size is "),
+        ({"camera": 3}, "^camera is 3; expected a Viewpoint"),
+    ],
+)
+def test_an_argument_of_a_wrong_kind_is_named(
+    cubes: env2mjcf.Scene, tmp_path: Path, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(TypeError, match=message):
+        film(cubes, PATH, tmp_path / "a.mp4", **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_gif_is_quicker_than_players_play_it() -> None:
+    with pytest.raises(ValueError, match="fps is 51"):
+        encoder("a.GIF", 51)
+    encoder("a.gif", 50)
+
+
+@pytest.mark.parametrize("fps", [30, 45, 50])
+def test_a_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: int) -> None:
+    from PIL import Image
+
+    # No two pictures are alike: equal ones are joined.
+    pictures = (np.full((4, 4, 3), shade, dtype=np.uint8) for shade in range(0, 180, 2))
+    encoder("a.gif", fps)(tmp_path / "a.gif", pictures, fps)
+    shown = Image.open(tmp_path / "a.gif")
+    total = 0
+    for i in range(shown.n_frames):
+        shown.seek(i)
+        total += shown.info["duration"]
+    assert total - 1000 == pytest.approx(90 / fps * 1000, abs=10)
+
+
 @needs_gl
+@needs_view
 @pytest.mark.parametrize(
     ("scene", "path"),
     [
@@ -150,6 +205,7 @@ def run(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 @needs_gl
+@needs_view
 def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("0 2.5 0 0 0 0"))
     write_path(cubes, PATH, tmp_path / "a.path")
@@ -164,6 +220,7 @@ def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> N
 
 
 @needs_gl
+@needs_view
 def test_render_draws_a_query_a_trail_and_contacts(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("0 2.5 0 0 0 0"))
     write_path(cubes, PATH, tmp_path / "a.path")
@@ -191,6 +248,7 @@ def test_render_refuses_what_it_cannot_do(words: tuple[str, ...], message: str, 
     assert message in shown.stderr
 
 
+@needs_view
 @pytest.mark.parametrize("words", [("render",), ("play", "a.path"), ("check", "a.path")])
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     cubes: env2mjcf.Scene, words: tuple[str, ...], tmp_path: Path
@@ -203,6 +261,16 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     assert (shown.returncode, shown.stdout) == (3, "")
     assert "error CFG552: none/a." in shown.stderr
     assert "lies in none, which is no folder" in shown.stderr
+
+
+def test_a_gl_library_that_is_none_is_wrong_usage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_scene(tmp_path, free_cube())
+    monkeypatch.setenv("MUJOCO_GL", "bogus")
+    for words in (("render", "scene.env", "-o", "a.png"), ("info", "scene.env")):
+        shown = run(*words, folder=tmp_path)
+        assert (shown.returncode, shown.stdout) == (2, "")
+        assert f"{words[0]}: MUJOCO_GL is 'bogus'; expected " in shown.stderr
+        assert "or disable for no pictures, or leave it unset" in shown.stderr
 
 
 def test_without_gl_render_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -91,6 +91,11 @@ class TestWhatIsLookedAt:
         (result,) = lint(["gone.env"])
         assert codes(result) == ["ENV101"]
 
+    def test_a_missing_path_is_bad_input_to_the_program(self, folder, capsys):
+        for words in (["gone.env"], ["gone.g", "."], ["nowhere/"], ["gone.env", "--json"]):
+            assert main(["lint", *words]) == 3
+        capsys.readouterr()
+
     def test_a_mesh_on_its_own(self, folder):
         (folder / "open.g").write_text("1 3 1 3\n1 1\n0 0 0 1 0 0 0 1 0\n1 2 -3\n")
         (folder / "bad.g").write_text("1 3 1 3\n1 1\n0 0 0 1 0 0 0 1 0\n1 2 -4\n")

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from extras import needs
 from scenes import MODELS
 
 import env2mjcf
@@ -59,6 +60,7 @@ def test_a_backend_that_is_named_is_tried_first(gl: str, monkeypatch: pytest.Mon
 
 
 @needs_gl
+@needs("view")
 def test_a_picture_leaves_this_process_without_gl(tmp_path: Path) -> None:
     program = (
         "import sys, env2mjcf\nfrom env2mjcf.view import picture\n"

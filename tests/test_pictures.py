@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -173,14 +174,37 @@ def test_a_direction_is_as_good_as_its_name(cubes: env2mjcf.Scene) -> None:
         ({"q": np.zeros((2, 6))}, "others can be ghosts"),
         ({"size": (0, 100)}, "at least 1 x 1"),
         ({"trail": np.zeros((0, 6))}, "k > 0"),
+        ({"camera": "top", "file": "a.jpg"}, r"^file is a\.jpg; expected one that ends in \.png"),
     ],
 )
 def test_an_impossible_picture_says_what_is_possible(
     cubes: env2mjcf.Scene, tmp_path: Path, arguments: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
-        picture(cubes, **arguments, file=tmp_path / "a.png")
+        picture(cubes, **{"file": tmp_path / "a.png", **arguments})
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("size", [(1.5, 3), "12", (1, 2, 3), (True, 5), None])
+def test_a_size_is_two_whole_numbers(cubes: env2mjcf.Scene, size: object) -> None:
+    with pytest.raises(TypeError, match=r"^size is "):
+        picture(cubes, size=size)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("mark", "message"),
+    [
+        (lambda: Points([[0, 0, math.nan]]), "^points that are not finite"),
+        (lambda: Points(np.zeros((3, 2))), r"^points of shape \(3, 2\); expected finite numbers of shape \(k, 3\)"),
+        (lambda: Polyline(np.zeros(6)), r"^points of shape \(6,\)"),
+        (lambda: Points(np.zeros((1, 3)), size=math.nan), "^size is nan"),
+        (lambda: Points(np.zeros((1, 3)), color=(2, 0, 0, 1)), r"^color is \(2, 0, 0, 1\)"),
+        (lambda: Direction(math.inf, 0), "finite angles"),
+    ],
+)
+def test_what_cannot_be_drawn_is_no_mark(mark: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        mark()
 
 
 def test_a_segmentation_of_an_unknown_body_names_the_known(cubes: env2mjcf.Scene) -> None:

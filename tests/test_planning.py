@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 from real_scenes import real_scene, scene_names
+from scenes import write_scene
 from truth import Truth
 
 import env2mjcf
 from env2mjcf.cli.main import main
 
-pytest.importorskip("ompl")
+pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
 from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
 from env2mjcf.planning.bridge import state_space
@@ -314,6 +315,34 @@ def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"planner": None}, "^planner is None; expected one of auto"),
+        ({"seed": 1.5}, "^seed is 1.5; expected a whole number"),
+        ({"robot": 0.0}, "^robot is 0.0; expected a whole number"),
+        ({"time": "60"}, "^time is '60'; expected a number"),
+        ({"resolution": "fine"}, "^resolution is 'fine'"),
+    ],
+)
+def test_an_argument_of_a_wrong_kind_is_named(arguments: dict[str, Any], message: str, room: Path):
+    with pytest.raises(TypeError, match=message):
+        plan(env2mjcf.load(room / "open.env"), [-2, 0, 0], [2, 0, 0], **arguments)
+
+
+def test_robots_that_do_not_move_are_judged_where_they_stay(tmp_path: Path):
+    robot = "Active\n1\ncube.g Planar Translational\nConnections\n0\n"
+    text = f"Boundary Box2D [-9:9; -9:9]\nMultibodies\n2\n{robot}{robot}"
+    scene = env2mjcf.load(write_scene(tmp_path, text), engine="mujoco")
+    # At the goal of both, they would touch; the second one stays away.
+    found = plan(scene, [-3, 0, 0, 5], [3, 0, 3, 0], robot=0)
+    assert found.solved
+    assert found.path[-1].tolist() == [3, 0, 0, 5]
+    # And where the second one stays in the way, it does not help that it is to be elsewhere.
+    with pytest.raises(ValueError, match="the goal is not valid"):
+        plan(scene, [-3, 0, 3, 0], [3, 0, 0, 5], robot=0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
         ({"goal": [0.3, 0, 0]}, r"the goal is not valid: cube and cube_2 \(obstacle\)"),
         ({"start": [-3.9, 0, 0]}, r"the start is not valid: outside: cube"),
         ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT, BatchEST\)"),
@@ -389,6 +418,7 @@ def test_the_path_that_json_tells_is_that_of_the_file(tmp_path: Path, room: Path
     assert rows_of(out) * [1, 1, np.pi] == pytest.approx(np.array(told["path"]), abs=1e-12)
     assert told["checks"] > 0
     assert all(told["certified"])
+    assert [d["code"] for d in told["diagnostics"]] == ["KIN312"]
 
 
 def test_without_a_solution_the_status_is_1_and_the_approach_is_written(room: Path, capsys: pytest.CaptureFixture[str]):
@@ -408,7 +438,9 @@ def test_a_goal_in_collision_is_a_finding_that_names_who_touches(room: Path, cap
     assert re.search(r"goal: not valid\n +cube and cube_2 \(obstacle\)", shown)
     assert not list(room.glob("*.path"))
     assert main([*words, "--json"]) == 1
-    assert list(json.loads(capsys.readouterr().out)["invalid"]) == ["goal"]
+    told = json.loads(capsys.readouterr().out)
+    assert list(told["invalid"]) == ["goal"]
+    assert [d["code"] for d in told["diagnostics"]] == ["KIN312"]
 
 
 def test_wrong_words_are_told_before_anything_is_planned(room: Path, capsys: pytest.CaptureFixture[str]):
@@ -416,6 +448,7 @@ def test_wrong_words_are_told_before_anything_is_planned(room: Path, capsys: pyt
     assert main(["plan", scene, "--query", query, "--planner", "dijkstra"]) == 2
     assert "planners: auto, RRTConnect" in capsys.readouterr().err
     assert main(["plan", scene, "--query", query, "--task", "2"]) == 2
+    assert "--task is 2: there is 1 task, counted from 1" in capsys.readouterr().err
     assert main(["plan", scene]) == 3
     assert "CFG540" in capsys.readouterr().err
     assert main(["plan", scene, "--query", query, "-o", str(room / "no" / "a.path")]) == 3

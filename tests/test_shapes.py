@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import fcl
 import mujoco
 import numpy as np
 import pytest
@@ -231,24 +231,23 @@ def test_mujoco_takes_thin_boxes(strategy: str, sides: tuple[float, ...], scene:
     assert (np.abs(local) <= np.array(sides) / 2 + thickness * (1 + 1e-6)).all()
 
 
-def bvh(mesh: Mesh) -> fcl.BVHModel:
-    model = fcl.BVHModel()
-    model.beginModel(len(mesh.vertices), len(mesh.faces))
-    model.addSubModel(mesh.vertices, mesh.faces)
-    model.endModel()
-    return model
-
-
 class Verdicts:
     """Two meshes, as prisms in MuJoCo and as triangles in python-fcl."""
 
     def __init__(self, obstacle: Mesh, robot: Mesh, extent: float) -> None:
+        self._fcl = pytest.importorskip("fcl", reason="no python-fcl to compare with")
         self.extent = extent
         shapes = [shape_of(m, "surface", 5e-6 * extent) for m in (obstacle, robot)]
         self.model = compiled(shapes[0].pieces, shapes[1].pieces)
         self.data = mujoco.MjData(self.model)
-        self.obstacle = fcl.CollisionObject(bvh(obstacle), fcl.Transform())
-        self.robot = fcl.CollisionObject(bvh(robot), fcl.Transform())
+        self.obstacle, self.robot = self.triangulated(obstacle), self.triangulated(robot)
+
+    def triangulated(self, mesh: Mesh) -> Any:
+        model = self._fcl.BVHModel()
+        model.beginModel(len(mesh.vertices), len(mesh.faces))
+        model.addSubModel(mesh.vertices, mesh.faces)
+        model.endModel()
+        return self._fcl.CollisionObject(model, self._fcl.Transform())
 
     def prisms(self, pose: np.ndarray) -> bool:
         self.data.qpos[:] = pose
@@ -257,11 +256,13 @@ class Verdicts:
         return self.data.ncon > 0
 
     def triangles(self, pose: np.ndarray) -> bool:
-        self.robot.setTransform(fcl.Transform(pose[3:], pose[:3]))
+        self.robot.setTransform(self._fcl.Transform(pose[3:], pose[:3]))
+        fcl = self._fcl
         return fcl.collide(self.obstacle, self.robot, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
 
     def clearance(self, pose: np.ndarray) -> float:
-        self.robot.setTransform(fcl.Transform(pose[3:], pose[:3]))
+        self.robot.setTransform(self._fcl.Transform(pose[3:], pose[:3]))
+        fcl = self._fcl
         return fcl.distance(self.obstacle, self.robot, fcl.DistanceRequest(), fcl.DistanceResult())
 
     def shallow(self, pose: np.ndarray, depth: float) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import needs
 from scenes import free_cube, write_scene
 
 import env2mjcf
@@ -124,11 +125,13 @@ class TestAssertValidPath:
 
 class TestPicture:
     @needs_gl
+    @needs("view")
     def test_is_drawn_where_it_was_asked_for(self, scene, tmp_path):
-        image = pytest.importorskip("PIL.Image")
+        from PIL import Image
+
         target = tmp_path / "new" / "deep.png"
         assert message(assert_free, scene, DEEP, picture=target)[-1] == f"    picture: {target}"
-        with image.open(target) as opened:
+        with Image.open(target) as opened:
             assert opened.size == (1280, 960)
             assert len(opened.convert("RGB").getcolors(1 << 20)) > 20
 
@@ -186,8 +189,8 @@ class TestPlugin:
         result.stdout.no_fnmatch_line("*picture*")
 
     @needs_gl
+    @needs("view")
     def test_draws_failures_into_a_folder(self, run, pytester):
-        pytest.importorskip("PIL")
         result = run("--env2mjcf-pictures", "drawn", "-k", "finds")
         (picture,) = (pytester.path / "drawn").iterdir()
         assert picture.name.startswith("test_it-test_finds_a_collision-")

@@ -124,7 +124,7 @@ def test_links_of_the_models_move_alike_there_and_back(name: str) -> None:
     assert_everything_moves_alike(env2mjcf.read(path, **options))
 
 
-@pytest.mark.parametrize("real", real_scenes(), ids=lambda r: r.name)
+@pytest.mark.parametrize("real", real_scenes(), ids=[r.name for r in real_scenes()])
 def test_links_of_real_scenes_move_alike_there_and_back(real: RealScene) -> None:
     assert_everything_moves_alike(env2mjcf.read(real.env, **real.keywords))
 

@@ -10,9 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import skip_without
 from real_scenes import scene_names
 
 import env2mjcf
+
+pytest.importorskip("fcl", reason="no python-fcl to compare with")
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -36,7 +39,7 @@ def case(corpus: Path, name: str) -> Case:
 def test_no_verdict_is_wrong_outside_the_band(corpus: Path, name: str, engine: str) -> None:
     """`auto` against triangles and containment, `surface` against triangles alone, both directions of error."""
     if engine == "exact":
-        pytest.importorskip("numba")
+        skip_without("fast")
     result = verdicts.examine(case(corpus, name), COUNT, seed=2, engine=engine)
     for mode, tally in result.tallies.items():
         assert tally.outside == []

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extras import skip_without
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
@@ -215,7 +216,7 @@ PAGES = [*sorted(MODELS.glob("*/*.env")), MODELS / "xml-arm" / "xml-arm.xml", MO
 
 @pytest.mark.parametrize("file", PAGES, ids=lambda p: p.name)
 def test_every_scene_can_be_shown_with_one_slider_for_each_number_of_the_file(file: Path) -> None:
-    pytest.importorskip("viser", reason="no viser: pip install 'env2mjcf[view]'")
+    skip_without("view")
     query = file.with_suffix(".query")
     robots = [file.with_suffix(".robot")] if file.with_suffix(".robot").exists() and file.suffix == ".env" else []
     known = {"query": query} if query.exists() and file.suffix == ".env" else {}
@@ -237,7 +238,7 @@ def test_every_scene_can_be_shown_with_one_slider_for_each_number_of_the_file(fi
 
 
 def test_a_scene_without_a_robot_can_be_shown(tmp_path: Path) -> None:
-    pytest.importorskip("viser", reason="no viser: pip install 'env2mjcf[view]'")
+    skip_without("view")
     text = "Boundary Box [-10:10 ; -10:10 ; -10:10]\n\nMultibodies\n1\n\nPassive\ncube.g 0 0 0 0 0 0\n"
     scene = env2mjcf.load(write_scene(tmp_path, text))
     with web_server.serving(web_server.free_port(), "title") as server:
@@ -272,7 +273,7 @@ def own_addresses() -> set[str]:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks the kernel of Linux who listens")
 def test_the_page_is_served_to_this_machine_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("viser", reason="no viser: pip install 'env2mjcf[view]'")
+    skip_without("view")
     with web_server.serving(web_server.free_port(), "title") as server:
         port = server.get_port()
         assert listeners(port) == {"0100007F"}
@@ -316,6 +317,7 @@ SEED = MODELS / "seed" / "seed.env"
 def test_a_path_that_does_not_fit_is_refused_before_anything_is_served(
     tmp_path: Path, name: str, content: str | None, message: str
 ) -> None:
+    skip_without("view")
     path = tmp_path / name
     if content is not None:
         path.write_text(content)
@@ -325,6 +327,7 @@ def test_a_path_that_does_not_fit_is_refused_before_anything_is_served(
 
 
 def test_a_path_in_radians_is_doubted(tmp_path: Path) -> None:
+    skip_without("view")
     path = tmp_path / "radians.csv"
     path.write_text("0 0 0 0.9 2.2 0\n")
     done = view(MODELS / "two-robots" / "two-robots.env", "--path", path, "--strict")

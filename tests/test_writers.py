@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
+from random import Random
 
 import pytest
 from conftest import CORPUS
@@ -12,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from real_scenes import RealScene, real_scenes
 from scenes import MODELS
-from strategies import environments
+from strategies import environments, laid_out, rich_environments
 from texts import ENV_TEXTS, LEGACY, ROBOT, XML_ENVIRONMENT, XML_ROBOT, B, D, E, Reader, warnings, write
 
 import env2mjcf
@@ -25,11 +27,12 @@ OWN = sorted(MODELS.glob("*/*.env"))
 DEGREE = math.pi / 180
 
 
-def written_and_read(scene: Environment, folder: Path) -> Environment:
+def written_and_read(scene: Environment, folder: Path, layout: Callable[[str], str] = str) -> Environment:
     """Write a scene and its robots, and read them."""
-    env = write(folder, env_text(scene), f"{scene.name}.env")
+    env = write(folder, layout(env_text(scene)), f"{scene.name}.env")
     robots = [
-        write(folder, robot_text(m), f"{i}.robot") for i, m in enumerate(m for m in scene.multibodies if m.robot_file)
+        write(folder, layout(robot_text(m)), f"{i}.robot")
+        for i, m in enumerate(m for m in scene.multibodies if m.robot_file)
     ]
     # Words such as Active are missing where a scene has no robot: then the text does not tell its dialect.
     return env2mjcf.read(env, robots=robots, dialect=scene.dialect.value, semantics=scene.semantics)
@@ -74,12 +77,12 @@ def test_every_model_is_kept(path: Path, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(path, robots=[robot] if robot.exists() else []), tmp_path)
 
 
-@pytest.mark.parametrize("real", real_scenes(), ids=lambda r: r.name)
+@pytest.mark.parametrize("real", real_scenes(), ids=[r.name for r in real_scenes()])
 def test_every_real_scene_is_kept(real: RealScene, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(real.env, **real.keywords), tmp_path)
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", TEXTS, ids=[p.stem for p in TEXTS])
 def test_every_real_text_is_kept(path: Path, tmp_path: Path) -> None:
     assert_kept(env2mjcf.read(path), tmp_path)
 
@@ -160,3 +163,20 @@ def test_round_numbers_stay_round() -> None:
 @given(scene=environments())
 def test_any_environment_is_kept(tmp_path_factory: pytest.TempPathFactory, scene: Environment) -> None:
     assert_kept(scene, tmp_path_factory.mktemp("scene"))
+
+
+@settings(max_examples=150, deadline=None)
+@given(scene=rich_environments())
+def test_any_environment_with_all_that_its_dialect_has_is_kept(
+    tmp_path_factory: pytest.TempPathFactory, scene: Environment
+) -> None:
+    assert_kept(scene, tmp_path_factory.mktemp("scene"))
+
+
+@settings(max_examples=150, deadline=None)
+@given(scene=rich_environments(), random=st.randoms(use_true_random=False))
+def test_blanks_comments_and_the_spelling_of_numbers_change_nothing(
+    tmp_path_factory: pytest.TempPathFactory, scene: Environment, random: Random
+) -> None:
+    again = written_and_read(scene, tmp_path_factory.mktemp("scene"), lambda text: laid_out(text, random))
+    assert kept(again) == kept(scene)

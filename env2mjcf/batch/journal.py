@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from numpy.lib.format import open_memmap, write_array_header_1_0
 from numpy.typing import NDArray
 
 from ..errors import ConversionError, DiagnosticLog
+from ..locking import Lock, try_lock
 
 _FORMAT = 1
 _ZEROS = bytes(1 << 20)
@@ -60,7 +60,7 @@ class Partial:
             self._handle = os.open(self._partial, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             self._fail(error)
-        if not (_locked(self._handle) and self._is_ours()):
+        if try_lock(self._handle) is Lock.TAKEN or not self._is_ours():
             os.close(self._handle)
             message = f"another process is writing {self._partial}"
             DiagnosticLog().fail(ConversionError, "CFG509", str(output), message, hint="wait, or choose another output")
@@ -103,6 +103,7 @@ class Partial:
                     left -= file.write(_ZEROS[:left])
             answers: NDArray[Any] = open_memmap(self._partial, mode="r+") if rows else np.zeros(0, kind)
         except OSError as error:
+            self.discard()
             self._fail(error)
         self._answers = answers
         return answers
@@ -118,6 +119,8 @@ class Partial:
                 os.fsync(file.fileno())
             fresh.replace(self._journal)
         except OSError as error:
+            with suppress(OSError):
+                fresh.unlink()
             self._fail(error)
 
     def finish(self) -> None:
@@ -155,18 +158,3 @@ class Partial:
             ConversionError, "CFG509", str(self._output),
             f"{self._output} cannot be written: {error.strerror or error}", hint="choose another output, or make room",
         )  # fmt: skip
-
-
-def _locked(handle: int) -> bool:
-    """Lock an open file for this process, where the system can; it is unlocked when the process ends, or dies."""
-    if sys.platform == "win32":
-        return True
-    import fcntl
-
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True  # some network file systems have no locks
-    return True

@@ -194,12 +194,13 @@ class _Work:
 
 def _refuse(output: Path, source: Path) -> None:
     log, path = DiagnosticLog(), str(output)
-    if output.is_dir() or not output.parent.is_dir():
-        what = "is a folder" if output.is_dir() else f"lies in {output.parent}, which is no folder"
+    exists = output.exists()
+    if (exists and not output.is_file()) or not output.parent.is_dir():
+        what = "is no regular file" if exists else f"lies in {output.parent}, which is no folder"
         log.fail(
             ConversionError, "CFG509", path, f"{path} {what}; expected a file to write", hint="name another output"
         )
-    if output.exists() and output.samefile(source):
+    if exists and output.samefile(source):
         log.fail(ConversionError, "CFG509", path, f"{path} is the input, too", hint="name another output")
 
 

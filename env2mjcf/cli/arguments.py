@@ -12,6 +12,7 @@ import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from ..options import Options, PathArgument
+from .printing import one_line
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +57,24 @@ def parse(verb: type[V], name: str, words: Sequence[str]) -> V:
     Raises:
         SystemExit: Help was asked for (0), or the words are wrong (2); tyro has said so.
     """
+    shown = [one_line(word) for word in words]
+    if shown == list(words):
+        return _parse(verb, name, words)
+    try:
+        return _parse(verb, name, words, silent=True)
+    except SystemExit:
+        _parse(verb, name, shown)  # says what is wrong, in words that are fit for a terminal
+        raise
+
+
+def _parse(verb: type[V], name: str, words: Sequence[str], *, silent: bool = False) -> V:
     return tyro.cli(
         verb,
         prog=f"env2mjcf {name}",
         # tyro would drop the examples.
         description=inspect.cleandoc(verb.__doc__ or "").split("\n\nAttributes:")[0],
         args=list(words),
+        console_outputs=not silent,
         registry=_paths_as_text(),
         config=(tyro.conf.DisallowNone,),
     )

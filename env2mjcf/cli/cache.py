@@ -67,7 +67,7 @@ class Cache:
         try:
             require()
         except ValueError as error:
-            print(f"env2mjcf: cache: {error}", file=sys.stderr)
+            print(f"env2mjcf: cache: {one_line(str(error))}", file=sys.stderr)
             return 3
         seconds = compile_all()
         if self.output.json:

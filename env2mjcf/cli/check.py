@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -12,7 +13,7 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog
+from ..errors import ConversionError, DiagnosticLog
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .judgements import (
@@ -106,13 +107,26 @@ class Check:
         )
         edges = self._edges(scene, rows.graph)
         valid = bool(judge.valid.all()) and (edges is None or bool(edges.valid.all()))
-        if self.picture is not None:
-            with working("drawing"):
-                draw(scene, rows, judge, edges, self.picture)
         if self.output.json:
-            print_json({"valid": valid, "dofs": scene.space.names, **as_json(judge, rows.graph, edges)})
+            print_json(
+                {
+                    "valid": valid,
+                    "dofs": scene.space.names,
+                    **as_json(judge, rows.graph, edges),
+                    "diagnostics": tuple(log),
+                }
+            )
         else:
             print_parts(self._lines(judge, rows.graph, edges))
+        if self.picture is not None:
+            # Whoever cannot have the picture has the report.
+            sys.stdout.flush()
+            try:
+                with working("drawing"):
+                    draw(scene, rows, judge, edges, self.picture)
+            except ConversionError as error:
+                print_diagnostics(error.diagnostics, self.output.verbose)
+                return 3
         return 0 if valid else 1
 
     def _edges(self, scene: Scene, graph: Graph | None) -> EdgeJudge | None:

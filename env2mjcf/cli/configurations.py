@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ..errors import DiagnosticLog
+from ..errors import DiagnosticLog, FormatError
 from ..formats.path import is_path
 from ..formats.query import read_query
 from ..formats.roadmap import is_roadmap
@@ -49,9 +49,34 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
     Paths (.path) and roadmaps (.map) are known by their text, too, whatever their names are.
 
     Raises:
-        FormatError: The file cannot be read, or a row fits no robot.
+        FormatError: The file cannot be read, a row fits no robot, or there is none: nothing is neither valid nor seen.
         ValueError: A path or roadmap is to be in radians.
     """
+    refuse_without_freedom(scene, scene.environment.path, log)
+    found = _of_file(scene, path, radians, limits, log)
+    if not found.labels:
+        log.fail(
+            FormatError, "CFG503", path, f"{path} holds no configuration; expected one at least",
+            hint="has what wrote it found nothing?",
+        )  # fmt: skip
+    return found
+
+
+def refuse_without_freedom(scene: Scene, path: str, log: DiagnosticLog) -> None:
+    """Refuse a scene in which nothing can move.
+
+    Raises:
+        FormatError: It is one.
+    """
+    if not scene.space.dim:
+        what = "has no robot" if not scene.environment.robots else "has no robot that moves"
+        log.fail(
+            FormatError, "CFG543", path, f"{path} {what}: there are no configurations of it",
+            hint="is a robot file missing? Give it with --robots FILE",
+        )  # fmt: skip
+
+
+def _of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: DiagnosticLog) -> Configurations:
     extension = Path(path).suffix.lower()
     if extension == ".npy":
         return of_array(scene, path, radians, limits, log)

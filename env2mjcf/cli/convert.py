@@ -11,6 +11,7 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
+from ..names import file_stem
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import one_line, print_diagnostics, print_json, working
@@ -46,7 +47,7 @@ class Convert:
 
         if self.out is not None and self.output_path is not None:
             raise ValueError(f"the output is given twice, as {self.out!r} and as --out {self.output_path!r}")
-        target = self.out or self.output_path or f"{Path(self.scene).stem}_mjcf"
+        target = self.out or self.output_path or f"{file_stem(Path(self.scene).stem)}_mjcf"
         with working(f"converting {self.scene}"):
             result = convert(self.scene, target, **keywords(self.options))
         print_diagnostics(result.diagnostics, self.output.verbose)

@@ -40,7 +40,7 @@ def _place(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | 
     if edges is not None and not edges.valid.all():
         verdict = edges.verdict(int(np.argmin(edges.valid)))
         return (rows.q[verdict.start] if verdict.at is None else verdict.at.q), True
-    return (rows.q[0] if len(rows.q) else scene.space.home), False
+    return rows.q[0], False
 
 
 def _marks(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | None) -> list[Mark]:
@@ -64,8 +64,8 @@ def _marks(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | 
 
 def _moving(scene: Scene, q: Array) -> list[int]:
     """Return the robots that are not at one place in all rows; the first one if none moves."""
-    moving = [i for i, s in enumerate(scene.space.robot_slices) if len(q) and np.ptp(q[:, s], axis=0).any()]
-    return moving or ([0] if scene.space.robot_slices and len(q) else [])
+    moving = [i for i, s in enumerate(scene.space.robot_slices) if np.ptp(q[:, s], axis=0).any()]
+    return moving or ([0] if scene.space.robot_slices else [])
 
 
 def _cut(scene: Scene, starts: Array, ends: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,7 +28,8 @@ class Lint:
     """List everything doubtful in scenes, their robots and meshes, and what touches at home.
 
     Folders are searched for .env, .robot and .xml files. An error in one file does not keep the others from being
-    looked at. The exit status is 1 if there is an error; with --strict also if there is a warning.
+    looked at. The exit status is 1 if there is an error; with --strict also if there is a warning; 3 if a path does not
+    exist.
 
     Examples:
       env2mjcf lint scenes/
@@ -48,7 +50,7 @@ class Lint:
     options: OptionFlags = field(default_factory=Options)
 
     def run(self) -> int:
-        """Print all findings and a summary; 1 if there is an error, or in strict mode a warning."""
+        """Print all findings and a summary; 1 if there is an error, or in strict mode a warning; 3 without a path."""
         from ..linting import lint
 
         if not self.paths:
@@ -72,6 +74,8 @@ class Lint:
             print(summary)
         if not results:
             print("env2mjcf: lint: no scene, robot or mesh was found", file=sys.stderr)
+        if not all(os.path.lexists(path) for path in self.paths):
+            return 3  # what the error says
         return 1 if errors or (self.options.strict and warnings) else 0
 
 

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
+from .. import starting
 from ..errors import Env2MjcfError, did_you_mean
-from ..view.offscreen import RenderError
+from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
-from .printing import one_line, print_diagnostics, print_json
+from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
 
 DONE, FINDING, WRONG_USAGE, BAD_INPUT, FAULT = range(5)
 # What shells report for a program that is stopped by SIGINT or SIGPIPE.
@@ -63,7 +64,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
+    starting.end_tidily()
     words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        tame_libraries()  # the process is the program's own
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of files come out as they are where that is possible, and never as an error.
         utf8 = sys.stdout.encoding.lower() in ("utf-8", "utf8")
@@ -114,6 +118,7 @@ def _version() -> str:
 
 def _run(name: str, verb: Verb) -> int:
     try:
+        refuse_unknown()  # or whatever imports MuJoCo would fail
         return verb.run()
     except Env2MjcfError as error:
         _show_traceback(verb.output.debug)
@@ -124,6 +129,8 @@ def _run(name: str, verb: Verb) -> int:
     except BrokenPipeError:
         raise
     except Exception as error:
+        if starting.interrupted:
+            return _INTERRUPTED
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
@@ -133,7 +140,9 @@ def _run(name: str, verb: Verb) -> int:
 
 
 def _fault(error: Exception, debug: bool = False) -> int:
-    """Report what should not have happened."""
+    """Report what should not have happened, unless it happened because of Ctrl-C, which libraries turn into others."""
+    if starting.interrupted:
+        return _INTERRUPTED
     _show_traceback(debug)
     notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
     _complain(f"a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} (--debug shows where)")
@@ -142,7 +151,7 @@ def _fault(error: Exception, debug: bool = False) -> int:
 
 def _show_traceback(debug: bool) -> None:
     if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
-        traceback.print_exc()
+        print(printable(traceback.format_exc()), end="", file=sys.stderr)
 
 
 def _complain(message: str) -> None:

@@ -16,7 +16,8 @@ from tyro.conf import Positional
 from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .outputs import refuse_unwritable
+from .configurations import refuse_without_freedom
+from .outputs import refuse_foreign_path, refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -75,14 +76,17 @@ class Plan:
 
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
-        from ..planning.names import known
+        from ..planning.names import installed
         from ..planning.planning import plan_through
         from ..simulation.preparing import load
 
-        known(self.planner)
+        # Before anything is loaded and looked at, which may take a minute.
+        installed(self.planner)
         if self.out is not None:
             query = () if self.options.query is None else (self.options.query,)
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
+            for file in (Path(self.out), _approach(Path(self.out))):
+                refuse_foreign_path(file)
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)
@@ -90,7 +94,7 @@ class Plan:
         query = self._query(scene, log)
         print_diagnostics(log, self.output.verbose)
         if (wrong := _wrong(scene, query)) is not None:
-            self._say_wrong(wrong)
+            self._say_wrong(wrong, log)
             return 1
         from .planning_meter import PlanningMeter
 
@@ -101,7 +105,7 @@ class Plan:
             )  # fmt: skip
         written = self._write(scene, query.robot, result)
         if self.output.json:
-            print_json(_summary(scene, result, written))
+            print_json({**_summary(scene, result, written), "diagnostics": tuple(log)})
         else:
             print_parts(_lines(result, written))
         return 0 if result.solved else 1
@@ -110,9 +114,10 @@ class Plan:
         """Return the task that is to be planned.
 
         Raises:
-            FormatError: There is none, or it has no goal.
+            FormatError: Nothing in the scene moves, there is no task, or it has no goal.
             ValueError: There are not so many.
         """
+        refuse_without_freedom(scene, self.scene, log)
         tasks = scene.queries
         if not tasks:
             log.fail(
@@ -120,7 +125,8 @@ class Plan:
                 hint="give a query file: --query FILE",
             )  # fmt: skip
         if not 1 <= self.task <= len(tasks):
-            raise ValueError(f"--task {self.task}: there are {len(tasks)} tasks, counted from 1")
+            count = "there is 1 task" if len(tasks) == 1 else f"there are {len(tasks)} tasks"
+            raise ValueError(f"--task is {self.task}: {count}, counted from 1")
         task = tasks[self.task - 1]
         if len(task.q) < 2:
             log.fail(
@@ -136,19 +142,24 @@ class Plan:
             return None
         out = Path(self.out)
         if not result.solved:
-            out = out.with_name(f"{out.stem}.approach.path")
+            out = _approach(out)
         q = result.path if self.corners else dense(scene, result)
         return write_path(scene, q, out, robot)
 
-    def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]]) -> None:
+    def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
         if self.output.json:
-            print_json({"solved": False, "invalid": dict(wrong)})
+            print_json({"solved": False, "invalid": dict(wrong), "diagnostics": tuple(log)})
             return
         parts: list[Text] = []
         for label, reasons in wrong:
             parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
             parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
         print_parts(parts)
+
+
+def _approach(out: Path) -> Path:
+    """Return where the best approach is written if there is no solution."""
+    return out.with_name(f"{out.stem}.approach.path")
 
 
 def dense(scene: Scene, result: Result) -> np.ndarray:

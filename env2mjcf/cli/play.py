@@ -75,10 +75,12 @@ class Play:
         from ..simulation.preparing import load
         from ..view.encoding import encoder
         from ..view.films import film
+        from ..view.shots import checked_size
         from .configurations import of_file
 
         camera, size = camera_of(self.camera), size_of(self.size)
-        encoder(self.out)
+        encoder(self.out, self.fps)
+        checked_size(size, least=2)
         refuse_unwritable(self.out, "CFG552")
         options = dataclasses.replace(self.options, query=None)
         with working(f"loading {self.scene}"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import logging
 import math
 import re
 import sys
@@ -47,6 +48,21 @@ def format_diagnostic(diagnostic: Diagnostic) -> str:
         diagnostic, message=printable(diagnostic.message), hint=printable(diagnostic.hint), span=span
     )
     return str(safe)
+
+
+class _Printable(logging.Formatter):
+    """What libraries log, with control characters escaped."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+def tame_libraries() -> None:
+    """Let what libraries log, and Python's warnings, come out as everything else does; they may quote files."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(_Printable("%(message)s"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
+    logging.captureWarnings(True)
 
 
 def print_parts(parts: Iterable[RenderableType]) -> None:

@@ -15,7 +15,7 @@ from tyro.conf import Positional
 from ..errors import DiagnosticLog
 from ..options import Options, PathArgument
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import print_diagnostics, print_json, working
+from .printing import one_line, print_diagnostics, print_json, working
 
 if TYPE_CHECKING:
     from ..simulation.scene import Scene
@@ -74,7 +74,7 @@ class View:
         if self.native:
             native.show(scene, scene.queries[0].q[0] if scene.queries else scene.space.home)
             return 0
-        return self._serve(scene, path)
+        return self._serve(scene, path, log)
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
         from ..view.playback import doubts
@@ -86,15 +86,15 @@ class View:
         doubts(scene, found.q, str(self.path), log)
         return found.q
 
-    def _serve(self, scene: Scene, path: Array | None) -> int:
+    def _serve(self, scene: Scene, path: Array | None, log: DiagnosticLog) -> int:
         from ..view import web_server
         from ..view.viewer import Viewer
 
         port = web_server.free_port(self.port)
         try:
-            with web_server.serving(port, f"env2mjcf: {scene.environment.name}") as server:
+            with web_server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as server:
                 viewer = Viewer(server, scene, path)
-                self._announce(server.get_port())
+                self._announce(server.get_port(), log)
                 try:
                     threading.Event().wait()
                 finally:
@@ -103,10 +103,10 @@ class View:
             pass
         return 0
 
-    def _announce(self, port: int) -> None:
+    def _announce(self, port: int, log: DiagnosticLog) -> None:
         url = f"http://127.0.0.1:{port}"
         if self.output.json:
-            print_json({"url": url, "port": port})
+            print_json({"url": url, "port": port, "diagnostics": tuple(log)})
         else:
             print(url)
         sys.stdout.flush()

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ConversionError, DiagnosticLog, FormatError, Span
+from ..errors import DiagnosticLog, FormatError, Span
 from ..formats.path import ALL_ROBOTS
+from ..formats.rows import LARGEST
 from ..model import Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..space import ConfigurationSpace
 from ..transforms import Array
-from ..writing import replaced
+from ..writing import output
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -69,12 +70,14 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
     because not every double is a multiple of pi.
 
     Raises:
-        ValueError: q has a wrong shape or value, or there is no such robot.
+        ValueError: q has a wrong shape, a value that is not finite or too large, or there is no such robot.
     """
     space = scene.space
     columns = columns_of(scene, robot)
-    rows = np.atleast_2d(space.check(q))
-    return _exactly(space, rows)[:, columns].tolist()
+    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, columns]
+    if (np.abs(numbers) > LARGEST).any():
+        raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
+    return numbers.tolist()
 
 
 def columns_of(scene: Scene, robot: int) -> slice:
@@ -106,15 +109,8 @@ def write(file: PathArgument, text: str) -> Path:
         ConversionError: It cannot be written.
     """
     path = Path(os.fspath(file))
-    try:
-        with replaced(path) as beside:
-            beside.write_bytes(text.encode("utf-8"))
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        DiagnosticLog().fail(
-            ConversionError, "CFG532", str(path), f"{path} cannot be written: {reason}",
-            hint="choose another file; its folder must exist",
-        )  # fmt: skip
+    with output(path, "CFG532") as beside:
+        beside.write_bytes(text.encode("utf-8"))
     return path
 
 

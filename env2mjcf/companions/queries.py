@@ -46,8 +46,11 @@ def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgume
 
     Raises:
         ConversionError: The file cannot be written.
-        ValueError: A query has a wrong shape, a value that is not finite, or a robot that does not exist.
+        ValueError: A query has a wrong shape, a value that is not finite, or a robot that does not exist; or there is
+            no configuration.
     """
     listed = [queries] if isinstance(queries, Query) else list(queries)
+    if not any(len(q.q) for q in listed):
+        raise ValueError("queries hold no configuration; expected a start and a goal")
     tasks = [Task(q.robot, tuple(map(tuple, file_numbers(scene, q.q, q.robot)))) for q in listed]
     return write(file, text.query_text(tasks, index=written_index(scene, 0) is not None))

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import whole
 from ..errors import Diagnostic, DiagnosticLog
 from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
+from ..formats.rows import LARGEST
 from ..formats.source import Source, read_source
 from ..options import Limits, PathArgument
 from ..simulation.scene import Scene
@@ -78,15 +80,21 @@ class Roadmap:
             robot: Whose it is.
 
         Raises:
-            ValueError: Shapes do not belong together, or an edge has an index that is none.
+            TypeError: The robot is no whole number.
+            ValueError: Shapes do not belong together, a number is not finite or an index no whole number, or an edge
+                leads to no node, to its own, or stands there twice.
         """
         nodes = np.asarray(q, dtype=np.float64)
-        pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
+        pairs = _pairs(edges)
         n, m = len(nodes), len(pairs)
         if nodes.ndim != 2:
             raise ValueError(f"nodes of shape {nodes.shape}; expected (n, dim)")
         if m and not (pairs.min() >= 0 and pairs.max() < n):
             raise ValueError(f"edges hold an index outside 0 to {n - 1}, the nodes")
+        if (pairs[:, 0] == pairs[:, 1]).any():
+            raise ValueError("an edge leads from a node to itself")
+        if len(np.unique(np.sort(pairs, axis=1), axis=0)) != m:
+            raise ValueError("an edge stands there twice; edges have no direction")
         lengths = np.linalg.norm(nodes[pairs[:, 1]] - nodes[pairs[:, 0]], axis=1)
         given = lengths if weights is None else np.asarray(weights, dtype=np.float64)
         between = [np.zeros((0, nodes.shape[1]))] * m if intermediates is None else list(intermediates)
@@ -94,10 +102,12 @@ class Roadmap:
             raise ValueError(
                 f"{given.shape} weights and {len(between)} intermediates; expected one for each of {m} edges"
             )
+        if not (np.abs(nodes) <= LARGEST).all() or not (np.abs(given) <= LARGEST).all():
+            raise ValueError(f"nodes or weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
         ways = tuple(np.asarray(b, dtype=np.float64).reshape(-1, nodes.shape[1]) for b in between)
         none = np.zeros(n, dtype=np.int64)
         return cls(
-            nodes, pairs, given, ways, np.arange(n), none + robot, np.full((n, 3), np.nan),
+            nodes, pairs, given, ways, np.arange(n), none + whole("robot", robot, 0), np.full((n, 3), np.nan),
             np.full(m, -1, dtype=np.int64), none,
         )  # fmt: skip
 
@@ -171,11 +181,25 @@ def write_roadmap(scene: Scene, roadmap: Roadmap, file: PathArgument) -> Path:
 
     Raises:
         ConversionError: The file cannot be written.
-        ValueError: A configuration has a wrong shape or a value that is not finite, or there is no such robot.
+        ValueError: A configuration has a wrong shape, a value or weight is not finite, or there is no such robot.
     """
     named = roadmap.header.environment or Path(scene.environment.path).name
+    if not (np.abs(roadmap.weights) <= LARGEST).all():
+        raise ValueError(f"weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
     index = written_index(scene, 0) is not None
     return write(file, text.roadmap_text(_nodes(scene, roadmap), named, index=index))
+
+
+def _pairs(edges: ArrayLike) -> Indices:
+    """Return edges as indices, (m, 2)."""
+    given = np.asarray(edges)
+    if not given.size:
+        return np.zeros((0, 2), dtype=np.int64)
+    if given.ndim != 2 or given.shape[1] != 2:
+        raise ValueError(f"edges of shape {given.shape}; expected (m, 2)")
+    if not np.issubdtype(given.dtype, np.integer):
+        raise ValueError(f"edges of {given.dtype}; expected whole numbers, indices of nodes")
+    return given.astype(np.int64)
 
 
 def _nodes(scene: Scene, roadmap: Roadmap) -> list[Node]:

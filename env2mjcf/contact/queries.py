@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import threading
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ..forking import Lock, lasting
 from ..geometry.assembly import Part
 from ..options import Collision, Engine
 from ..pipeline import Compiled
@@ -59,7 +59,7 @@ class ContactQueries:
         self._containment = Containment(self._pairs, self._parts)
         self._collision: Collision = compiled.options.collision
         self._scratch = threading.local()
-        self._lock = threading.RLock()
+        self._lock = Lock()
         self._of_triangles: _Triangles | None = None
         self._default: Engine = compiled.options.engine
         self._exact: ExactEngine | None = None
@@ -167,7 +167,7 @@ class ContactQueries:
     def _moving_clearances(self, rows: Array) -> Array:
         return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
 
-    @cached_property
+    @lasting
     def _always(self) -> bool:
         """Whether bodies that cannot move against each other touch, or are inside each other: always, then."""
         if self._static or not self._containment.needed:
@@ -175,7 +175,7 @@ class ContactQueries:
         inside = self._containment.pairs_inside(self._poses_by_name(self._space.home[None]))
         return any(self._pairs[i].constant for i, _ in inside)
 
-    @cached_property
+    @lasting
     def _constant_clearance(self) -> float:
         """Distance of the pairs that cannot move against each other."""
         return float(self._triangles.constant.signed(self._poses_by_name(self._space.home[None]), 1)[0])
@@ -256,7 +256,7 @@ class ContactQueries:
             by_name[part.name] = np.broadcast_to(part.pose, (len(poses), 4, 4))
         return by_name
 
-    @cached_property
+    @lasting
     def _surfaces(self) -> Surfaces:
         return Surfaces(self._parts, self._collision)
 

@@ -59,9 +59,14 @@ class _Head:
     end: int
 
 
-def is_path(source: Source) -> bool:
+def begins_as_path(text: str) -> bool:
     """Whether a text begins as path files do."""
-    return source.text.lstrip()[:15].upper() == "VIZMO_PATH_FILE"
+    return text.lstrip("\ufeff").lstrip()[:15].upper() == "VIZMO_PATH_FILE"
+
+
+def is_path(source: Source) -> bool:
+    """Whether a file is meant as a path."""
+    return begins_as_path(source.text)
 
 
 def read_path(source: Source, dofs: Sequence[int], links: Sequence[int], log: DiagnosticLog) -> PathFile:

@@ -16,6 +16,8 @@ _START, _STOP = "#####GRAPHSTART#####", "#####GRAPHSTOP#####"
 _GRAPH_START = re.compile(r"(?<!\S)\S*?GRAPHSTART\S*")
 _GRAPH_STOP = re.compile(r"(?<!\S)\S*?GRAPHSTOP\S*")
 _SECTION = re.compile(r"(?<!#)#{3,}(PREAMBLE|ENVFILE|LP|CD|DM|RNGSEED)START#{3,}[ \t]*")
+# What would end the line of the env file's name, or begin a section in it, or is no text.
+_UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]|#{3,}|(?<=GRAPH)(?=ST)")
 _VERSION = re.compile(r"\s*(PMPL )?Roadmap Version( Number)?\s+(\S+)", re.IGNORECASE)
 _COUNTS = re.compile(r"\s*(\S+)\s+(\S+)\s+(\S+)")
 
@@ -104,11 +106,11 @@ def roadmap_text(nodes: Iterable[Node], environment: str, *, index: bool) -> str
 
     Args:
         nodes: With every edge at both of its ends.
-        environment: Name of the env file.
+        environment: Name of the env file; what no line of the format can hold of it is written as "_".
         index: Whether the robot's index stands in front of each configuration.
     """
     listed = list(nodes)
-    lines = ["#####ENVFILESTART#####", environment, "#####ENVFILESTOP#####", _START]
+    lines = ["#####ENVFILESTART#####", _UNFIT.sub("_", environment), "#####ENVFILESTOP#####", _START]
     edges = sum(len(node.edges) for node in listed)
     lines.append(f"{len(listed)} {edges} {max((node.vid for node in listed), default=-1) + 1}")
     for node in listed:

@@ -16,9 +16,8 @@ _WORD = re.compile(r"\S+")
 _COMMENT = re.compile(r"#|//")
 # Dialect A's InfoCfg wrote three numbers behind some configurations.
 _LEGACY_INFO_FIELDS = 3
-# Larger numbers overflow as soon as they are squared.
 LARGEST = 1e100
-"""The largest number of a configuration."""
+"""Larger numbers are no coordinates: they overflow as soon as they are squared."""
 
 
 class Extra(StrEnum):

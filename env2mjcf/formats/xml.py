@@ -224,7 +224,8 @@ def _parse(source: Source, log: DiagnosticLog, limits: Limits) -> tuple[Any, int
         span = source.column_span(place.line, column)
         if _HUGE_TEXT in str(error.msg):
             log.fail(
-                FormatError, "ENV181", source.path, "a text of more than ten million characters is not read",
+                FormatError, "ENV181", source.path,
+                "a text or attribute of more than ten million characters is not read",
                 hint="what is read in it are names and numbers", span=span,
             )  # fmt: skip
         message = f"not well-formed XML: {str(error.msg).rstrip()}"

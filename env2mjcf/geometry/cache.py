@@ -7,6 +7,8 @@ import os
 import platform
 import re
 import secrets
+import stat
+import struct
 import sys
 import time
 import zipfile
@@ -16,7 +18,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +40,13 @@ _LOWERED = 0.9
 _STALE_SECONDS = 3600.0
 _ENTRY = re.compile(r"[0-9a-f]{64}\.npz")
 _STAGED = re.compile(r"\.[0-9a-f]{64}-[0-9a-f]{16}\.npz")
+_ALTERED = "its content is not what was written"
 _LIBRARIES = ("numpy", "mujoco", "coacd")
 # All that numpy raises on files that are cut short or altered.
-_DAMAGE = (zipfile.BadZipFile, EOFError, ValueError, TypeError, KeyError, IndexError, MemoryError, RecursionError)
+_DAMAGE = (
+    zipfile.BadZipFile, struct.error, EOFError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError,
+    RuntimeError,
+)  # fmt: skip
 
 
 def default_folder() -> Path | None:
@@ -166,7 +172,9 @@ class GeometryCache:
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
                 with beside.open("xb") as file:
-                    np.savez(file, allow_pickle=False, digest=_digest(key, arrays), **arrays)
+                    # `pack` holds plain numbers only, and allow_pickle=False names one more array to numpy below 2.1.
+                    entry: dict[str, Any] = {"digest": _digest(key, arrays), **arrays}
+                    np.savez(file, **entry)
                 os.replace(beside, path)
             finally:
                 beside.unlink(missing_ok=True)
@@ -253,12 +261,35 @@ def _read(path: Path, key: str) -> dict[str, NDArray[Any]]:
     Raises:
         ValueError: It is not what was written under this key.
     """
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    with open(path, "rb", opener=_without_waiting) as file:
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode):
+            raise ValueError("it is no file")
+        try:
+            arrays = _arrays(file, found.st_size)
+        except OSError as error:
+            # It leads to places that are not in the file.
+            raise ValueError(_ALTERED) from error
     digest = arrays.pop("digest")
     if not np.array_equal(digest, _digest(key, arrays)):
-        raise ValueError("its content is not what was written")
+        raise ValueError(_ALTERED)
     return arrays
+
+
+def _arrays(file: IO[bytes], size: int) -> dict[str, NDArray[Any]]:
+    # What is written is not compressed, so that no entry becomes larger than it is.
+    with zipfile.ZipFile(file) as archive:
+        parts = archive.infolist()
+    if any(p.compress_type != zipfile.ZIP_STORED for p in parts) or sum(p.file_size for p in parts) > size:
+        raise ValueError(_ALTERED)
+    file.seek(0)
+    with np.load(file, allow_pickle=False) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that stands in its place would be waited for."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _digest(key: str, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:

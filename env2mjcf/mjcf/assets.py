@@ -13,7 +13,7 @@ from trimesh.exchange.stl import export_stl
 
 from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
-from ..names import mesh_stem, unique
+from ..names import file_stem, mesh_stem, unique
 from ..transforms import Array
 from .writer import Element, add, numbers, to_text
 
@@ -81,7 +81,7 @@ class AssetBook:
 
 
 def _file_stem(name: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)[:80]
+    return file_stem("".join(c if c.isalnum() or c in "-_." else "_" for c in name)[:80])
 
 
 def _visual_file(mesh: Mesh) -> tuple[bytes, str]:

@@ -9,6 +9,7 @@ from lxml import etree
 
 from ..errors import DiagnosticLog
 from ..geometry.assembly import Assembly
+from ..names import file_stem
 from ..options import Options
 from ..pairs import PairTable
 from ..space import ConfigurationSpace
@@ -27,7 +28,7 @@ class Document:
     """A compiled scene.
 
     Attributes:
-        name: Name of the model.
+        name: Name of the model, fit for a file.
         xml: The MJCF text.
         assets: Contents of the files it refers to, by path relative to it.
         owners: Name of the body that each collision geom belongs to.
@@ -66,7 +67,10 @@ def compile_mjcf(
     add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(
-        environment.name, f"{_header(assembly, options)}\n{text}", compilation.assets.files, compilation.owners
+        file_stem(environment.name),
+        f"{_header(assembly, options)}\n{text}",
+        compilation.assets.files,
+        compilation.owners,
     )
 
 

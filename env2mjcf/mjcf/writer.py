@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -52,7 +53,7 @@ def comment(parent: Element, lines: Iterable[str]) -> None:
 
 def comment_text(lines: Iterable[str], indent: str = "") -> str:
     """Return the text of a comment; `--` and control characters cannot stand in one."""
-    lines = [plain(line).replace("--", "- -") for line in lines]
+    lines = [re.sub("-(?=-)", "- ", plain(line)) for line in lines]
     if len(lines) == 1:
         return f" {lines[0]} "
     return "\n" + "".join(f"{indent}  {line}\n" for line in lines) + indent

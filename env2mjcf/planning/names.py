@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 from ..errors import did_you_mean
 
 # The names that are asked for, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
@@ -34,8 +36,11 @@ def known(name: str) -> str:
     """Return the name of a planner as it is listed, whatever its case; OMPL's own names will do.
 
     Raises:
+        TypeError: It is no word.
         ValueError: There is no such planner; the message lists all.
     """
+    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"planner is {name!r}; expected one of {', '.join(PLANNERS)}")
     spelled = {n.lower(): n for n in PLANNERS} | {c.lower(): n for n, c in OMPL_PLANNERS.items()}
     if name.lower() not in spelled:
         guess = did_you_mean(name, PLANNERS)
@@ -43,3 +48,15 @@ def known(name: str) -> str:
             f"there is no planner {name!r}{f'; {guess}' if guess else ''} (planners: {', '.join(PLANNERS)})"
         )
     return spelled[name.lower()]
+
+
+def installed(name: str) -> str:
+    """Return the name of a planner as it is listed; see `known`.
+
+    Raises:
+        ValueError: There is no such planner, or OMPL is not installed.
+    """
+    spelled = known(name)
+    if find_spec("ompl") is None:
+        raise ValueError(f"planner {spelled} needs one more package: pip install 'env2mjcf[planning]'")
+    return spelled

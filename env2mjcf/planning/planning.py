@@ -10,6 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import positive, whole
+from ..forking import Lock
 from ..simulation.scene import Scene
 from ..simulation.verdicts import Judge
 from ..transforms import Array
@@ -18,6 +20,10 @@ from .names import known
 from .result import Plan, Progress
 from .space import PlanningSpace
 from .watch import Watch
+
+# OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
+# depend on which of them is quicker.
+_one_at_a_time = Lock()
 
 
 def plan(
@@ -37,11 +43,12 @@ def plan(
 
     Every edge of a solution is checked at steps much finer than the planner's, and proved to be free where it keeps
     1e-5 of the extent away from everything (`Scene.edge_is_free`). Equal seeds give equal paths, unless time runs out.
+    A process plans one way at a time: a call in another thread waits, and its time begins afterwards.
 
     Args:
         scene: The scene.
         start: (dim,) all robots.
-        goal: (dim,).
+        goal: (dim,). With `robot`, its numbers for the other robots count for nothing.
         planner: One of `PLANNERS`, in any case.
         robot: Index of the robot that moves, the others staying as they are in `start`; None moves all.
         time: Seconds after which to give up.
@@ -53,8 +60,10 @@ def plan(
         progress: Called a few times a second.
 
     Raises:
-        ValueError: Start or goal is no configuration, or not valid (the message says who touches); there is no such
-            planner or robot, or OMPL is not installed; time, seed or resolution is out of range.
+        TypeError: planner is no name, or robot, time, seed or resolution no number of the right kind.
+        ValueError: Start or goal is no configuration, or not valid with the other robots as they are in `start` (the
+            message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
+            resolution is out of range.
     """
     rows = np.stack([_one(scene, start), _one(scene, goal)])
     return plan_through(
@@ -75,23 +84,30 @@ def plan_through(
     shorten: bool = True,
     progress: Callable[[Progress], None] | None = None,
 ) -> Plan:
-    """Plan a way through configurations, (k, dim), one leg after the other; see `plan`."""
+    """Plan a way through configurations, (k, dim), one leg after the other; see `plan`.
+
+    With `robot`, the others stay as they are in the first configuration.
+    """
     rows, name = scene.space.check(q), known(planner)
     _refuse(scene, rows, robot, time, seed)
+    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    columns = _columns(scene, robot)
+    rows = _others_as_at_start(rows, columns)
+    _refuse_invalid(scene, rows)
     if find_spec("ompl") is None:
         raise ValueError(f"planner {name} needs one more package: pip install 'env2mjcf[planning]'")
     scene.warm_up()
-    space = PlanningSpace(scene, rows, _columns(scene, robot))
-    step = scene.step(resolution)
-    watch = Watch(time, len(rows) - 1, progress)
-    began, results = clock.perf_counter(), list[LegResult]()
-    for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
-        watch.leg = number
-        leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
-        results.append(leg.plan(start, goal))
-        if not results[-1].solved:
-            break
-    return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
+    space = PlanningSpace(scene, rows, columns)
+    with _one_at_a_time:
+        watch = Watch(time, len(rows) - 1, progress)
+        began, results = clock.perf_counter(), list[LegResult]()
+        for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
+            watch.leg = number
+            leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
+            results.append(leg.plan(start, goal))
+            if not results[-1].solved:
+                break
+        return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
 
 
 def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:
@@ -124,19 +140,30 @@ def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
     return every if robot is None else every[scene.space.robot_slices[robot]]
 
 
+def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
+    """Return what the robots go through: in every row, what does not move is as in the first."""
+    stay = np.repeat(rows[:1], len(rows), axis=0)
+    stay[:, columns] = rows[:, columns]
+    return stay
+
+
 def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int) -> None:
-    """Raise a ValueError for what cannot be planned."""
+    """Raise a TypeError or ValueError for arguments that nothing can be planned with."""
     robots = len(scene.space.robot_slices)
+    if not scene.space.dim:
+        raise ValueError("nothing can move: the scene has no degrees of freedom")
     if rows.ndim != 2 or len(rows) < 2:
         raise ValueError(f"configurations of shape {rows.shape}; expected a start and a goal, (k, {scene.space.dim})")
-    if robot is not None and not 0 <= robot < robots:
+    if robot is not None and not 0 <= whole("robot", robot, 0) < robots:
         raise ValueError(f"there is no robot {robot}; the scene has {robots}, counted from 0")
-    if not scene.space.dim or (robot is not None and not len(_columns(scene, robot))):
-        raise ValueError("nothing can move: there are no degrees of freedom")
-    if not 0 < time < float("inf"):
-        raise ValueError(f"time is {time}; expected a positive number of seconds")
-    if seed < 0:
-        raise ValueError(f"seed is {seed}; expected zero or more")
+    if robot is not None and not len(_columns(scene, robot)):
+        raise ValueError(f"nothing can move: robot {robot} has no degrees of freedom")
+    positive("time", time)
+    whole("seed", seed, 0)
+
+
+def _refuse_invalid(scene: Scene, rows: Array) -> None:
+    """Raise a ValueError that says who touches in the first configuration that is not valid."""
     judge = Judge(scene, rows, names_of(len(rows)))
     for i in np.flatnonzero(~judge.valid):
         verdict = judge.verdict(int(i))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.paths import EdgeSteps
+from ..forking import lasting
 from ..transforms import Array
 from .scene import Scene
 from .verdicts import Judge, Verdict
@@ -148,12 +148,12 @@ class EdgeJudge:
         """Whether a depth is that of a thin plate, not of a body."""
         return verdict.at is not None and self._judge.rough(verdict.at)
 
-    @cached_property
+    @lasting
     def _rows(self) -> Indices:
         """Row of `_judge` of each edge that fails a check."""
         return np.cumsum(np.isfinite(self._fractions)) - 1
 
-    @cached_property
+    @lasting
     def _judge(self) -> Judge:
         failed = np.isfinite(self._fractions)
         labels = [self._edges.labels[i] for i in np.flatnonzero(failed).tolist()]

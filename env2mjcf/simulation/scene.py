@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.queries import ContactQueries
 from ..errors import Diagnostic
+from ..forking import Lock
 from ..model import Environment
 from ..pipeline import Compiled
 from ..report import Report, report
@@ -59,7 +60,7 @@ class Scene(Answers):
         self.diagnostics: tuple[Diagnostic, ...] = compiled.diagnostics
         self._compiled = compiled
         self._data: mujoco.MjData | None = None
-        self._lock = threading.Lock()
+        self._lock = Lock()
 
     # What the scene is.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -12,7 +13,7 @@ from ..formats.query import query_text
 from ..formats.writers import env_text, robot_text
 from ..model import Dialect, Environment
 from ..options import PathArgument
-from ..writing import replaced
+from ..writing import output
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Written:
 def write_environment(
     environment: Environment, file: PathArgument, *, mesh_dirs: Iterable[PathArgument] = (), inputs: Iterable[str] = ()
 ) -> Written:
-    """Write an environment in its own dialect, each file whole or not at all, the env file last.
+    """Write an environment in its own dialect, all files or none.
 
     Meshes stay where they are: their names are written so that they are found from the new folder.
 
@@ -63,8 +64,11 @@ def write_environment(
         # Dialects B to D begin each configuration with its robot; so must any with several robots.
         plain = environment.dialect in (Dialect.A, Dialect.E) and len(environment.robots) == 1
         texts[query] = query_text(environment.tasks, index=not plain)
-    for path, text in {**texts, out: env_text(placed)}.items():
-        _write(path, text, log)
+    with ExitStack() as written:
+        # All are written before any is renamed, the env file last, as the first that was entered.
+        for path, text in {out: env_text(placed), **texts}.items():
+            beside = written.enter_context(output(path, "ENV179"))
+            beside.write_bytes(text.encode("utf-8", "surrogateescape"))
     return Written(out, tuple(names), query, outside, tuple(log))
 
 
@@ -119,15 +123,3 @@ def _shown(folder: Path) -> Path:
     """Return a folder as one would name it: from the current folder, if it lies in that."""
     real, current = Path(os.path.realpath(folder)), Path(os.path.realpath(""))
     return real.relative_to(current) if real.is_relative_to(current) else real
-
-
-def _write(path: Path, text: str, log: DiagnosticLog) -> None:
-    try:
-        with replaced(path) as beside:
-            beside.write_bytes(text.encode("utf-8", "surrogateescape"))
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        log.fail(
-            ConversionError, "ENV179", str(path), f"{path} cannot be written: {reason}",
-            hint="choose another file; its folder must exist",
-        )  # fmt: skip

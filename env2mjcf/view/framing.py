@@ -28,6 +28,10 @@ class Direction:
     azimuth: float
     elevation: float
 
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.azimuth) and math.isfinite(self.elevation)):
+            raise ValueError(f"a direction of {self.azimuth}, {self.elevation}; expected finite angles")
+
     def forward(self) -> Array:
         """Return the unit vector, (3,)."""
         # Straight down has no azimuth: a thousandth of a radian less has one.
@@ -46,6 +50,11 @@ class Viewpoint:
 
     position: tuple[float, float, float]
     forward: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        for name, value in (("position", self.position), ("forward", self.forward)):
+            if len(value) != 3 or not all(math.isfinite(x) for x in value):
+                raise ValueError(f"{name} is {value!r}; expected three finite numbers")
 
 
 # As the camera of that name in the MJCF.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..simulation.scene import Scene
 from .framing import Camera, Viewpoint
 from .offscreen import read_exactly
-from .shots import Frame, Shot, taken
+from .shots import Frame, Shot, checked_size, taken
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +47,7 @@ def segmentation(
         only: Names of the bodies that are drawn; all by default.
 
     Raises:
+        TypeError: The size or the camera is of a wrong kind.
         ValueError: q, size, camera or a name are not what they should be.
         RenderError: It cannot be drawn here.
     """
@@ -55,8 +56,8 @@ def segmentation(
     if chosen is not None and (unknown := sorted(chosen - set(names))):
         raise ValueError(f"there is no body {unknown[0]!r}; expected some of {', '.join(names)}")
     row = scene.space.home if q is None else scene.space.check(q)
-    width, height = size
-    shot = Shot(scene, [Frame(row)], size, camera, see_through=False, segmentation=True, only=chosen)
+    width, height = checked_size(size)
+    shot = Shot(scene, [Frame(row)], (width, height), camera, see_through=False, segmentation=True, only=chosen)
     with taken(shot) as (answer, stream):
         geoms = np.frombuffer(read_exactly(stream, width * height * 4), dtype=np.int32).reshape(height, width)
     label_of = np.full(scene.model.ngeom + 1, -1, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""What is drawn beside the bodies: lines and dots in the world frame."""
+"""What is drawn beside the bodies: lines and dots in the world frame; what cannot be drawn is a ValueError."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import positive
 
 Color = tuple[float, float, float, float]
 
@@ -31,6 +33,9 @@ class Polyline:
     color: Color = TRAIL
     width: float = 3.0
 
+    def __post_init__(self) -> None:
+        _check(self.points, self.color, "width", self.width)
+
     def described(self) -> dict[str, Any]:
         """Return the mark in terms of JSON."""
         return {"kind": "line", **_described(self.points, self.color), "size": self.width}
@@ -49,6 +54,9 @@ class Points:
     points: ArrayLike
     color: Color = TRAIL
     size: float = 8.0
+
+    def __post_init__(self) -> None:
+        _check(self.points, self.color, "size", self.size)
 
     def described(self) -> dict[str, Any]:
         """Return the mark in terms of JSON."""
@@ -71,9 +79,14 @@ class Arrows:
     color: Color = BAD
     length: float = 60.0
 
+    def __post_init__(self) -> None:
+        _check(self.points, self.color, "length", self.length)
+        if _triples("directions", self.directions).shape != _triples("points", self.points).shape:
+            raise ValueError("there are not as many directions as points")
+
     def described(self) -> dict[str, Any]:
         """Return the mark in terms of JSON."""
-        directions = np.asarray(self.directions, dtype=np.float64).reshape(-1, 3).tolist()
+        directions = _triples("directions", self.directions).tolist()
         return {
             "kind": "arrows",
             **_described(self.points, self.color),
@@ -86,4 +99,23 @@ Mark = Polyline | Points | Arrows
 
 
 def _described(points: ArrayLike, color: Color) -> dict[str, Any]:
-    return {"points": np.asarray(points, dtype=np.float64).reshape(-1, 3).tolist(), "color": list(color)}
+    return {"points": _triples("points", points).tolist(), "color": list(color)}
+
+
+def _check(points: ArrayLike, color: Color, name: str, size: float) -> None:
+    """Raise a ValueError or TypeError that names what cannot be drawn."""
+    _triples("points", points)
+    positive(name, size)
+    if len(color) != 4 or not all(0 <= part <= 1 for part in color):
+        raise ValueError(f"color is {color!r}; expected RGBA, four numbers from 0 to 1")
+
+
+def _triples(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return positions or directions, (k, 3)."""
+    found = np.asarray(values, dtype=np.float64)
+    if not found.size:
+        return np.zeros((0, 3))
+    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+        what = f"of shape {found.shape}" if np.isfinite(found).all() else "that are not finite"
+        raise ValueError(f"{name} {what}; expected finite numbers of shape (k, 3)")
+    return found

@@ -19,6 +19,8 @@ _WORKER = Path(__file__).with_name("worker.py")
 _SECONDS_TO_TRY = 60
 # What MuJoCo itself reads from MUJOCO_GL as "no pictures".
 _OFF = ("disable", "disabled", "off", "false", "0")
+# What MuJoCo takes, besides what draws here; with any other word it cannot even be imported.
+_ANY = ("", "enable", "enabled", "on", "true", "1", "glfw", "glx")
 # A GPU first, where there is one; OSMesa needs none.
 _CANDIDATES = {"Linux": ("egl", "osmesa"), "Darwin": ("cgl",), "Windows": ("wgl",)}
 
@@ -33,6 +35,19 @@ def backend() -> str | None:
     A backend that MUJOCO_GL names is tried first; MUJOCO_GL=disable switches pictures off.
     """
     return _backend(os.environ.get("MUJOCO_GL", "").strip().lower())
+
+
+def refuse_unknown() -> None:
+    """Make sure that MUJOCO_GL names something that MuJoCo knows.
+
+    Raises:
+        ValueError: It does not; the message lists what it may be.
+    """
+    word = os.environ.get("MUJOCO_GL", "").strip().lower()
+    candidates = _CANDIDATES.get(platform.system(), ())
+    if word not in (*_OFF, *_ANY, *candidates):
+        valid = " or ".join(candidates or ("glfw",))
+        raise ValueError(f"MUJOCO_GL is {word!r}; expected {valid}, or disable for no pictures, or leave it unset")
 
 
 def missing() -> str:
@@ -54,6 +69,7 @@ def drawn(request: Mapping[str, Any]) -> Generator[tuple[dict[str, Any], IO[byte
     Raises:
         RenderError: There is no GL library, or the child failed.
     """
+    refuse_unknown()
     name = backend()
     if name is None:
         raise RenderError(missing())
@@ -61,7 +77,7 @@ def drawn(request: Mapping[str, Any]) -> Generator[tuple[dict[str, Any], IO[byte
         assert child.stdin is not None
         assert child.stdout is not None
         # A request may be longer than a pipe holds, and so may be what comes back.
-        feeder = threading.Thread(target=_feed, args=(child.stdin, json.dumps(request).encode()), daemon=True)
+        feeder = threading.Thread(target=_feed, args=(child.stdin, json.dumps(request).encode() + b"\n"), daemon=True)
         feeder.start()
         head = child.stdout.readline()
         if not head:

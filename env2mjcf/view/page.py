@@ -152,7 +152,7 @@ class Page:
             places.update((f"via {i}", row) for i, row in enumerate(rows[1:-1], 1))
         if len(rows) > 1:
             places["goal"] = rows[-1]
-        group = self._server.gui.add_button_group(label, list(places))
+        group = self._server.gui.add_button_group(wording.label(label), list(places))
         group.on_click(lambda _: self._controls.go(places[group.value]))
 
     def _add_path(self, track: Track) -> None:

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..contact.types import Contact
 from ..simulation.scene import Scene
-from ..writing import replaced
+from ..writing import output
 from .framing import Camera
 from .marks import BAD, Arrows, Mark, Points, Polyline
 from .offscreen import RenderError, read_exactly
-from .shots import Frame, Shot, taken
+from .shots import Frame, Shot, checked_size, taken
 from .trails import paced, reference_points
 
 # Robots along a trail.
@@ -57,9 +57,14 @@ def picture(
         (height, width, 3) uint8, RGB.
 
     Raises:
-        ValueError: q, ghosts, trail, size or camera are not what they should be.
+        ConversionError: The file cannot be written.
+        TypeError: The size or the camera is of a wrong kind.
+        ValueError: q, ghosts, trail, size, camera or the file's ending are not what they should be.
         RenderError: It cannot be drawn here, or pillow, which writes files, is not installed.
     """
+    width, height = checked_size(size)
+    if file is not None and not os.fsdecode(file).lower().endswith(".png"):
+        raise ValueError(f"file is {os.fsdecode(file)}; expected one that ends in .png")
     row = scene.space.home if q is None else scene.space.check(q)
     if row.ndim != 1:
         raise ValueError(f"q has shape {row.shape}; expected ({scene.space.dim},): others can be ghosts")
@@ -69,8 +74,9 @@ def picture(
         lines += trail_marks(scene, trail)
         shades = np.concatenate([shades, paced(scene, trail, _GHOSTS)[0]])
     touching, arrows = touched(scene.contacts(row)) if contacts else (frozenset[str](), ())
-    shot = Shot(scene, [Frame(row, touching, arrows)], size, camera, shades, tuple(lines), see_through)
-    width, height = size
+    shot = Shot(
+        scene, [Frame(row, touching, arrows)], (width, height), camera, shades, tuple(lines), see_through
+    )  # fmt: skip
     with taken(shot) as (_, stream):
         data = read_exactly(stream, width * height * 3)
     pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
@@ -99,6 +105,7 @@ def write_png(pixels: NDArray[np.uint8], file: str | os.PathLike[str]) -> None:
     """Write pixels, (height, width, 3) or (height, width, 4), as a PNG file, whole or not at all.
 
     Raises:
+        ConversionError: It cannot be written.
         RenderError: Pillow is not installed.
     """
     try:
@@ -109,5 +116,5 @@ def write_png(pixels: NDArray[np.uint8], file: str | os.PathLike[str]) -> None:
     image = Image.fromarray(pixels).quantize(256, kmeans=1, dither=Image.Dither.FLOYDSTEINBERG)
     buffer = io.BytesIO()
     image.save(buffer, format="PNG", optimize=True)
-    with replaced(file) as beside:
+    with output(file, "CFG552") as beside:
         beside.write_bytes(buffer.getvalue())

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import itertools
+import sys
 import tempfile
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from numbers import Integral
 from pathlib import Path
 from typing import IO, Any
 
 import mujoco
 import numpy as np
 
+from ..arguments import whole
 from ..dofs import DofKind
 from ..geometry.assembly import Part
 from ..mjcf.boundary import boundary_lines
 from ..simulation.scene import Scene
 from ..transforms import Array
-from .framing import FIELD_OF_VIEW, Camera, Viewpoint, candidates, fitted, named_direction
+from .framing import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
-from .offscreen import drawn
+from .offscreen import RenderError, drawn
 
 # A boundary that is so much larger than all bodies is drawn as far as the picture reaches.
 _FAR_BOUNDARY = 2.0
@@ -85,6 +88,24 @@ class Answer:
     see_through: bool
 
 
+def checked_size(size: object, least: int = 1) -> tuple[int, int]:
+    """Return the width and height of a picture in pixels.
+
+    Raises:
+        TypeError: It is no pair of whole numbers.
+        ValueError: One of them is out of range.
+    """
+    pair: tuple[object, ...] = tuple(size) if isinstance(size, Iterable) and not isinstance(size, str) else ()
+    if len(pair) != 2 or any(isinstance(n, bool) or not isinstance(n, Integral) for n in pair):
+        raise TypeError(f"size is {size!r}; expected width and height, two whole numbers of pixels")
+    width, height = (whole("size", n, -sys.maxsize) for n in pair)
+    if not least <= min(width, height) <= max(width, height) <= LARGEST:
+        raise ValueError(
+            f"size is {width} x {height} pixels; expected at least {least} x {least} and at most {LARGEST} x {LARGEST}"
+        )
+    return width, height
+
+
 @contextmanager
 def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
     """Draw a shot in a process of its own.
@@ -93,25 +114,39 @@ def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
         What was chosen, and the stream that the pictures come out of; see `worker`.
 
     Raises:
+        TypeError: The size or the camera is of a wrong kind.
         ValueError: The camera has an unknown name, or the size is out of range.
         RenderError: It cannot be drawn here.
     """
-    if not 1 <= min(shot.size) <= max(shot.size) <= LARGEST:
-        raise ValueError(
-            f"a picture of {shot.size[0]} x {shot.size[1]} pixels; "
-            f"expected at least 1 x 1 and at most {LARGEST} x {LARGEST}"
-        )
+    checked_size(shot.size)
     points = _in_view(shot)
     views = _views(shot, points)
     with tempfile.TemporaryDirectory(prefix="env2mjcf-") as folder:
         model = Path(folder) / "scene.mjb"
-        mujoco.mj_saveModel(shot.scene.model, str(model), None)
+        _save(shot.scene.model, model)
         with drawn(_request(shot, views, points, model)) as (head, stream):
             yield Answer(views[head["camera"]], head["see_through"]), stream
 
 
+def _save(model: mujoco.MjModel, file: Path) -> None:
+    """Write a model for the process that draws.
+
+    Raises:
+        RenderError: There is no room for it.
+    """
+    # MuJoCo would only warn, in a log in the current folder.
+    content = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    try:
+        file.write_bytes(content.data)
+    except OSError as error:
+        raise RenderError(f"cannot draw: {file} cannot be written: {error.strerror or error}") from error
+
+
 def _views(shot: Shot, points: Array) -> list[Viewpoint]:
     """Return the viewpoints that may be chosen from."""
+    if not isinstance(shot.camera, Viewpoint | Direction | str | None):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"camera is {shot.camera!r}; expected a Viewpoint, a Direction or the name of one")
     if isinstance(shot.camera, Viewpoint):
         return [shot.camera]
     aspect = shot.size[0] / shot.size[1]

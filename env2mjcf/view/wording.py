@@ -19,11 +19,15 @@ _BOX = "height:9.5em;overflow-y:auto;margin:0.4em 0.8em 0.9em;font-size:0.82em;l
 
 def text(name: str) -> str:
     """Return a name fit for HTML: what has a meaning there, turns the direction of text, or is invisible, is shown."""
-    seen = "".join(
+    return html.escape(label(name), quote=True)
+
+
+def label(name: str) -> str:
+    """Return a name fit for what the page shows as text anyway: what turns its direction, or is invisible, is shown."""
+    return "".join(
         c.encode("unicode_escape").decode("ascii") if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
         for c in name
     )
-    return html.escape(seen, quote=True)
 
 
 def status(judgement: Judgement) -> str:

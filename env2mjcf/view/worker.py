@@ -1,4 +1,4 @@
-"""Draws pictures; run as a script by `offscreen`, with MUJOCO_GL set and the request as JSON on stdin.
+"""Draws pictures; run as a script by `offscreen`, with MUJOCO_GL set and the request as a line of JSON on stdin.
 
 Answers on stdout with one line of JSON, which says what camera was chosen, and then the pictures, one after the other:
 rows from the top, of RGB bytes, or of int32 geom numbers for a segmentation.
@@ -32,7 +32,8 @@ _HIDDEN_GROUP = 5
 
 def main() -> None:
     """Draw what stdin asks for; `null` only tries the GL backend."""
-    request = json.load(sys.stdin)
+    # Not up to the end: processes that were forked meanwhile may hold the other end of the pipe open.
+    request = json.loads(sys.stdin.readline())
     if request is None:
         mujoco.GLContext(16, 16).make_current()
     else:

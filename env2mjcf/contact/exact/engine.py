@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import time
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +39,73 @@ def require() -> None:
 
 def _entries() -> Any:
     # Imported here, because numba takes its time to import, and is an extra.
-    return import_module(".kernels.entries", __package__)
+    with _loading:
+        try:
+            return import_module(".kernels.entries", __package__)
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise ValueError(
+                "the exact engine finds no folder to keep what it compiles: name one that may be written with "
+                "NUMBA_CACHE_DIR, or choose engine='mujoco'"
+            ) from error
+
+
+class _Loading:
+    """Held while the engine is imported; a process is not forked before that is done, nor while numba compiles.
+
+    Numba's lock, and Python's own of modules that are being imported, would stay locked in the child. Unlike what
+    `forking.Lock` guards, what they guard cannot be begun anew.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._compiling: Any = None
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+    def before_fork(self) -> None:
+        """Wait until nothing is imported or compiled, and keep it so."""
+        self._lock.acquire()
+        # Not imported by anybody: then nothing compiles.
+        module = sys.modules.get("numba.core.compiler_lock")
+        self._compiling = getattr(module, "global_compiler_lock", None)
+        if self._compiling is not None:
+            self._compiling.acquire()
+
+    def after_fork(self) -> None:
+        """Go on, in the parent and in the child."""
+        if self._compiling is not None:
+            self._compiling.release()
+        self._lock.release()
+
+
+_loading = _Loading()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=_loading.before_fork, after_in_parent=_loading.after_fork, after_in_child=_loading.after_fork
+    )
+
+
+def _call(entry: Any, *arguments: Any) -> None:
+    """Call a compiled function; if that fails, forget what is kept of it on the disk, and compile it anew.
+
+    Compiled functions raise nothing; what numba has written to the disk may be damaged, and then numba says so in words
+    of its own. It has no checksum, so damage that can still be read is not found.
+    """
+    try:
+        entry(*arguments)
+    except Exception:
+        kept = list(Path(entry.stats.cache_path).glob(f"entries.*.{entry.__name__}-*.nbi"))
+        if not kept:
+            raise
+        for file in kept:
+            file.unlink(missing_ok=True)
+        entry(*arguments)
 
 
 class ExactEngine:
@@ -62,26 +132,30 @@ class ExactEngine:
     def collisions(self, q: Array) -> Bools:
         """Return whether any pair touches, (n,), at configurations (n, dim)."""
         out = np.empty(len(q), dtype=np.bool_)
-        self._collisions(*self._tables, np.ascontiguousarray(q), out)
+        # Without a further call: this may be one verdict of less than a microsecond.
+        try:
+            self._collisions(*self._tables, _plain(q), out)
+        except Exception:
+            _call(self._collisions, *self._tables, _plain(q), out)
         return out
 
     def validities(self, q: Array) -> Bools:
         """Return whether configurations are within limits and the boundary, and no pair touches, (n,)."""
         out = np.empty(len(q), dtype=np.bool_)
-        self._entries.validities(*self._tables, np.ascontiguousarray(q), out)
+        _call(self._entries.validities, *self._tables, _plain(q), out)
         return out
 
     def distances(self, q: Array) -> Array:
         """Return the least distance of any pair, (n,); inf without pairs, -1 where any touches."""
         out = np.empty(len(q))
-        self._entries.distances(*self._tables, np.ascontiguousarray(q), out)
+        _call(self._entries.distances, *self._tables, _plain(q), out)
         return out
 
     def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> Bools:
         """Return whether any pair touches at one of so many steps, (e,), of ways from (e, dim) by (e, dim)."""
         out = np.empty(len(start), dtype=np.bool_)
-        start, delta = np.ascontiguousarray(start), np.ascontiguousarray(delta)
-        self._entries.edges_collide(*self._tables, start, delta, steps, out)
+        start, delta = _plain(start), _plain(delta)
+        _call(self._entries.edges_collide, *self._tables, start, delta, steps, out)
         return out
 
     def edges_are_free(
@@ -99,9 +173,14 @@ class ExactEngine:
             band: Bodies as near as this may touch.
         """
         out = np.empty(len(start), dtype=np.bool_)
-        start, delta = np.ascontiguousarray(start), np.ascontiguousarray(delta)
-        self._entries.edges_are_free(*self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
+        start, delta = _plain(start), _plain(delta)
+        _call(self._entries.edges_are_free, *self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
         return out
+
+
+def _plain(rows: Array) -> Array:
+    """Return rows as an array that may be written: numba would compile all kernels again for one that may not."""
+    return rows if rows.flags.carray else np.array(rows, order="C")
 
 
 def compile_all() -> float:
@@ -113,9 +192,9 @@ def compile_all() -> float:
     nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
     entries, tables = _entries(), packed(nothing)
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
-    entries.collisions(*tables, rows, answers)
-    entries.validities(*tables, rows, answers)
-    entries.distances(*tables, rows, floats)
-    entries.edges_collide(*tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
-    entries.edges_are_free(*tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
+    _call(entries.collisions, *tables, rows, answers)
+    _call(entries.validities, *tables, rows, answers)
+    _call(entries.distances, *tables, rows, floats)
+    _call(entries.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
+    _call(entries.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start

@@ -1,0 +1,46 @@
+"""What Ctrl-C does to the program `env2mjcf`, from its first import on; a library leaves that alone.
+
+While numpy is imported Ctrl-C may become an error of another kind, or a traceback; so it ends the program at once,
+which has done nothing yet, until there is something that may have to be tidied up.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+
+interrupted = False
+"""Whether Ctrl-C was pressed: what goes wrong afterwards may go wrong because of it."""
+
+
+_ours = False
+
+
+def is_program() -> bool:
+    """Return whether Python was started to run the program, and is still importing it."""
+    first, words = (sys.argv or [""])[0], sys.orig_argv
+    if first == "-m":
+        return "-m" in words and words[words.index("-m") + 1 :][:1] == ["env2mjcf"]
+    return os.path.basename(first) in ("env2mjcf", "env2mjcf.exe")
+
+
+def end_at_once() -> None:
+    """Let Ctrl-C end the process without a word; what is ignored stays ignored."""
+    global _ours  # noqa: PLW0603  as above
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _interrupt):
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        _ours = True
+
+
+def end_tidily() -> None:
+    """Let Ctrl-C raise a KeyboardInterrupt again, if `end_at_once` has changed that."""
+    if _ours and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    global interrupted  # noqa: PLW0603  a process has one Ctrl-C
+    interrupted = True
+    raise KeyboardInterrupt

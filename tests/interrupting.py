@@ -1,0 +1,133 @@
+"""Sends Ctrl-C to the program at random moments, and looks at what it says and leaves."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import folders
+import numpy as np
+from scenes import free_cube, write_scene
+
+import env2mjcf
+from env2mjcf.companions import write_path
+
+# What each verb writes, and how it is asked to; `view` goes on until it is interrupted.
+VERBS = {
+    "convert": "scene.env made",
+    "batch": "scene.env q.npy -o made/v.npy --what clearance --threads 2 --engine mujoco",
+    "render": "scene.env -o made/a.png --size 160x120",
+    "play": "scene.env a.path -o made/a.mp4 --size 160x120",
+    "play gif": "scene.env a.path -o made/a.gif --size 160x120",
+    "plan": "scene.env --query a.query -o made/b.path --time 4",
+    "translate": "scene.env -o made/b.env --dialect C",
+    "check": "scene.env a.path --picture made/a.png",
+    "info": "scene.env",
+    "lint": "scene.env",
+    "view": "scene.env --no-browser",
+}
+
+
+@dataclass(slots=True)
+class Tally:
+    """What came of interruptions.
+
+    Attributes:
+        interrupted: Processes that ended with status 130, or at once by the signal.
+        finished: Processes that were done before.
+        wrong: What should not have been.
+    """
+
+    interrupted: int = 0
+    finished: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+
+def prepare(folder: Path) -> None:
+    """Write all that the verbs read."""
+    scene = env2mjcf.load(write_scene(folder, free_cube("0 4 0 0 0 0", "2 -1 0 0 0 0")), engine="mujoco")
+    write_path(scene, np.array([[-3.0, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 1]]), folder / "a.path")
+    (folder / "a.query").write_text("0 -3 -3 0 0 0 0\n0 -3 3 -2 0 0 0\n")
+    np.save(folder / "q.npy", scene.space.sample(4000, seed=0))
+    (folder / "made").mkdir()
+
+
+def interrupt(verb: str, folder: Path, after: float, tally: Tally) -> None:
+    """Run a verb, interrupt it after some seconds, and look at what it says and leaves.
+
+    The signal goes to the process alone, so that what it started is its own to stop.
+    """
+    command = [sys.executable, "-m", "env2mjcf", verb.partition(" ")[0], *VERBS[verb].split()]
+    for path in (folder / "made").rglob("*"):
+        if path.is_file():
+            path.unlink()
+    child = subprocess.Popen(
+        command, cwd=folder, env=folders.ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        text=True, start_new_session=True, preexec_fn=heed,  # noqa: PLW1509
+    )  # fmt: skip
+    try:
+        time.sleep(after)
+        child.send_signal(signal.SIGINT)
+        said = child.communicate(timeout=30)[1]
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+        tally.wrong.append(f"{verb} after {after:.3f} s: still there after 30 seconds")
+        return
+    finally:
+        left = _left_in_session(child.pid)
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
+    what = f"{verb} after {after:.3f} s: status {child.returncode}"
+    if child.returncode in (130, -signal.SIGINT):
+        tally.interrupted += 1
+    elif child.returncode in ((0, 1, 130) if verb != "view" else (0,)):
+        tally.finished += 1
+    else:
+        tally.wrong.append(f"{what}: {said[-300:]}")
+    # Before `site` has run there is nothing of ours that could keep the interpreter from saying so.
+    if "Traceback" in said and "env2mjcf" in said:
+        tally.wrong.append(f"{what}: {said[-600:]}")
+    if left:
+        tally.wrong.append(f"{what}: left {len(left)} processes")
+    names = {p.name for p in (folder / "made").rglob("*") if p.is_file() and p.name.startswith(".")}
+    if names:
+        tally.wrong.append(f"{what}: left {sorted(names)}")
+
+
+def interrupt_randomly(verb: str, folder: Path, count: int, longest: float, seed: int) -> Tally:
+    """Interrupt a verb at some moments of its first seconds."""
+    chance, tally = random.Random(f"{seed} {verb}"), Tally()
+    for _ in range(count):
+        interrupt(verb, folder, chance.uniform(0.05, longest), tally)
+    return tally
+
+
+def heed() -> None:
+    # Jobs in the background inherit that it is ignored.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _left_in_session(session: int) -> list[int]:
+    """Return the processes of a session that are still there a second after its first one has ended."""
+    deadline = time.monotonic() + 1.0
+    while True:
+        found = [int(p.name) for p in Path("/proc").glob("[0-9]*") if _session_of(p) == session]
+        if not found or time.monotonic() > deadline:
+            return found
+        time.sleep(0.02)
+
+
+def _session_of(process: Path) -> int | None:
+    try:
+        fields = (process / "stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return None
+    # What has ended and only waits to be asked how does no harm.
+    return None if fields[0] == "Z" else int(fields[3])

@@ -1,0 +1,218 @@
+"""Disks that are full, folders that may not be written: one error for each verb, and what was there stays."""
+
+from __future__ import annotations
+
+import mmap  # noqa: F401  which a process that has become another user may not find
+import os
+import re
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import folders
+import numpy as np
+import pytest
+from scenes import free_cube, write_scene
+
+import env2mjcf
+from env2mjcf.companions import write_path, write_query
+from env2mjcf.errors import DiagnosticLog
+from env2mjcf.geometry.cache import GeometryCache
+from env2mjcf.view import offscreen, picture
+from env2mjcf.writing import replaced
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX limits, permissions and mounts")
+GL = offscreen.backend() is not None
+OLD = b"VIZMO_PATH_FILE   Path Version 2012\nwhat was there before\n"
+
+# Verb and all its words but the output, its name, the code of the error.
+VERBS = {
+    "convert": (["convert", "scene.env"], "scene.xml", "MJC42"),
+    "batch": (["batch", "scene.env", "q.npy", "-o"], "v.npy", "CFG509"),
+    "render": (["render", "scene.env", "--size", "160x120", "-o"], "a.png", "CFG552"),
+    "play mp4": (["play", "scene.env", "a.path", "--fps", "4", "--size", "160x120", "-o"], "a.mp4", "CFG552"),
+    "play gif": (
+        ["play", "scene.env", "a.path", "--fps", "4", "--size", "160x120", "-o"],
+        "a.gif",
+        "CFG552",
+    ),
+    "plan": (["plan", "scene.env", "--query", "a.query", "--planner", "BatchEST", "-o"], "b.path", "CFG5[34]2"),
+    "translate": (["translate", "scene.env", "--dialect", "E", "--query", "a.query", "-o"], "b.env", "ENV179"),
+    "check": (["check", "scene.env", "a.path", "--picture"], "a.png", "CFG552"),
+}
+DRAWING = ("render", "play mp4", "play gif", "check")
+some_verbs = pytest.mark.parametrize(
+    "verb", [v if v not in DRAWING or GL else pytest.param(v, marks=pytest.mark.skip("no GL")) for v in VERBS]
+)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene, a way, a query and configurations; everybody may read them."""
+    folder = tmp_path_factory.mktemp("inputs")
+    scene = env2mjcf.load(write_scene(folder, free_cube("0 4 0 0 0 0")), engine="mujoco")
+    way = np.array([[-3.0, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 1], [-2, 2, 1, 0, 0, 1]])
+    write_path(scene, way, folder / "a.path")
+    (folder / "a.query").write_text("0 -3 -3 0 0 0 0\n0 3 -2 0 0 0 0\n")
+    np.save(folder / "q.npy", scene.space.sample(20_000, seed=0))
+    for above in (folder, *folder.parents):
+        if above.stat().st_uid == os.getuid() and above != Path("/"):
+            above.chmod(above.stat().st_mode | 0o055)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def full_disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A small disk; tests fill it."""
+    folder = tmp_path_factory.mktemp("disk")
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], capture_output=True, text=True, check=False
+    ) if sys.platform == "linux" else None  # fmt: skip
+    if mounted is None or mounted.returncode:
+        pytest.skip(f"no disk can be mounted: {mounted.stderr.strip() if mounted else sys.platform}")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def filled(disk: Path, name: str) -> dict[str, bytes]:
+    """Empty a disk, put an old output there, fill it, and return what it holds."""
+    for path in sorted(disk.rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    (disk / name).write_bytes(b"<mujoco/>" if name.endswith(".xml") else OLD)
+    with (disk / "filler").open("wb", buffering=0) as file, suppress(OSError):
+        while file.write(bytes(1024)):
+            pass
+    return content(disk)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def run(verb: str, inputs: Path, out: Path, before=bool) -> tuple[int, str, str, str]:
+    """Run a verb; return what `folders.verb` does, and the code that is expected."""
+    words, name, code = VERBS[verb]
+    named = [str(inputs / w) if (inputs / w).is_file() else w for w in words]
+    engine = [] if verb == "translate" else ["--engine", "mujoco"]
+    return *folders.verb([*named, str(out / name), *engine], before), code
+
+
+def judged(found: tuple[int, str, str, str], verb: str, reason: str) -> None:
+    """One error says what is wrong; results are there only if they do not depend on the file."""
+    status, out, err, code = found
+    assert status == 3, err
+    errors = [line for line in err.splitlines() if ": " in line and not line.startswith(("    ", "env2mjcf: "))]
+    assert len(errors) == 1
+    assert re.search(rf"error {code}.*: .*{reason}", errors[0])
+    assert "hint: " in err
+    assert ("3 configurations: 3 valid" in out) if verb == "check" else out == "", (
+        "a report does not wait for a picture"
+    )
+
+
+@some_verbs
+def test_a_full_disk_is_said_and_what_was_there_stays(verb: str, inputs: Path, full_disk: Path) -> None:
+    before = filled(full_disk, VERBS[verb][1])
+    judged(run(verb, inputs, full_disk), verb, "No space left on device")
+    assert content(full_disk) == before
+
+
+@pytest.mark.parametrize("verb", ["convert", "translate", "batch"])
+def test_wherever_the_disk_is_full_nothing_is_left(verb: str, inputs: Path, full_disk: Path) -> None:
+    """A little more room each time, until all fits."""
+    outcomes: list[int] = []
+    for pages in range(30):
+        before = filled(full_disk, VERBS[verb][1])
+        os.truncate(full_disk / "filler", len(before["filler"]) - 4096 * pages)
+        before = content(full_disk)
+        outcomes.append(run(verb, inputs, full_disk)[0])
+        if outcomes[-1] == 0:
+            break
+        assert content(full_disk) == before
+    assert outcomes == [3] * (len(outcomes) - 1) + [0]
+    assert len(outcomes) > 2
+
+
+@some_verbs
+def test_a_file_may_not_grow_beyond_the_limit_of_the_process(verb: str, inputs: Path, tmp_path: Path) -> None:
+    (tmp_path / VERBS[verb][1]).write_bytes(b"<mujoco/>" if verb == "convert" else OLD)
+    before = content(tmp_path)
+    found = run(verb, inputs, tmp_path, lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
+    if verb in DRAWING:
+        # What is drawn does not even reach the process that draws.
+        assert found[0] == 2
+        assert re.fullmatch(r"env2mjcf: \w+: cannot draw: .* cannot be written: File too large\n", found[2])
+    else:
+        judged(found, verb, "File too large")
+    assert content(tmp_path) == before
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody who may not")
+@some_verbs
+def test_a_folder_that_may_not_be_written_is_said(verb: str, inputs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / VERBS[verb][1]).write_bytes(b"<mujoco/>" if verb == "convert" else OLD)
+    for above in (out, *out.parents[:3]):
+        above.chmod(0o755)
+    before = content(tmp_path)
+    reason = "Permission denied" if verb in ("batch", "translate") else "may not be written"
+    judged(run(verb, inputs, out, lambda: os.setuid(65534)), verb if verb != "check" else "", reason)
+    assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize("verb", ["convert", "batch", "plan", "translate"])
+def test_a_place_where_no_file_can_be_is_said(verb: str, inputs: Path) -> None:
+    judged(run(verb, inputs, Path("/proc")), verb, "")
+
+
+@pytest.mark.parametrize("verb", ["plan", "batch"])
+def test_a_device_is_not_replaced_by_a_file(verb: str, inputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(VERBS, verb, (VERBS[verb][0], "null", VERBS[verb][2]))
+    judged(run(verb, inputs, Path("/dev")), verb, "is no regular file")
+    with pytest.raises(OSError, match="no regular file"), replaced("/dev/full") as beside:
+        beside.write_text("")
+    assert Path("/dev/null").is_char_device()
+    assert Path("/dev/full").is_char_device()
+    assert not list(Path("/dev").glob(".*"))
+
+
+def test_a_plan_does_not_replace_what_is_no_path(inputs: Path, tmp_path: Path) -> None:
+    for name, text in (("b.path", "my notes\n"), ("b.approach.path", "my other notes\n"), ("b.path", "\0\1\2")):
+        (tmp_path / name).write_text(text)
+        judged((*run("plan", inputs, tmp_path)[:3], "CFG553"), "plan", "is no path file, and is not replaced")
+        assert (tmp_path / name).read_text() == text
+        (tmp_path / name).unlink()
+    for text in ("", OLD.decode()):
+        (tmp_path / "b.path").write_text(text)
+        assert run("plan", inputs, tmp_path)[0] == 0
+        assert (tmp_path / "b.path").read_text() != text
+
+
+def test_every_writer_says_that_the_disk_is_full(inputs: Path, full_disk: Path) -> None:
+    scene = env2mjcf.load(inputs / "scene.env", engine="mujoco")
+    writers = {
+        "a.path": lambda file: write_path(scene, scene.space.home, file),
+        "a.query": lambda file: write_query(scene, env2mjcf.Query(0, scene.space.home[None]), file),
+        "a.png": lambda file: picture(scene, size=(64, 48), file=file),
+    }
+    for name, write in writers.items():
+        if name == "a.png" and not GL:
+            continue
+        before = filled(full_disk, name)
+        with pytest.raises(env2mjcf.ConversionError, match="No space left on device"):
+            write(full_disk / name)
+        assert content(full_disk) == before
+
+
+def test_a_cache_on_a_full_disk_stops_nothing(inputs: Path, full_disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = filled(full_disk, "old")
+    log = DiagnosticLog()
+    value = GeometryCache(full_disk).remember(("a",), lambda: (1.0, 2.0), kinds=(), known={}, log=log)
+    assert value == (1.0, 2.0)
+    assert [d.code for d in log] == ["GEO261"]
+    assert "No space left on device" in next(iter(log)).message
+    assert content(full_disk) == before

@@ -1,0 +1,53 @@
+"""Ctrl-C at any time: status 130, no traceback, nothing half-written, nothing that goes on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import folders
+import interrupting
+import pytest
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+
+
+@pytest.mark.parametrize("verb", ["convert", "batch", "play", "plan"])
+def test_a_verb_that_is_interrupted_leaves_nothing(verb: str, tmp_path: Path) -> None:
+    interrupting.prepare(tmp_path)
+    tally = interrupting.interrupt_randomly(verb, tmp_path, count=2, longest=2.5, seed=0)
+    assert tally.wrong == []
+    assert tally.interrupted + tally.finished == 2
+
+
+@pytest.mark.parametrize("module", ["numpy", "trimesh", "mujoco"])
+def test_it_ends_the_program_while_it_is_imported(module: str, tmp_path: Path) -> None:
+    """Without a word: numpy would make another error of it, and Python a traceback."""
+    interrupting.prepare(tmp_path)
+    # Found before the real one; it is interrupted in the middle of its import.
+    (tmp_path / "first").mkdir()
+    (tmp_path / "first" / f"{module}.py").write_text(
+        "import os, signal\n"
+        "try:\n    os.kill(os.getpid(), signal.SIGINT)\n    for _ in range(10**9): pass\n"
+        "except KeyboardInterrupt:\n    raise ImportError('initialization failed')\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path / "first"), str(folders.ROOT)])}
+    done = subprocess.run(
+        [sys.executable, "-m", "env2mjcf", "convert", "scene.env", "out"], cwd=tmp_path, env=environment,
+        capture_output=True, text=True, check=False, timeout=60, preexec_fn=interrupting.heed,
+    )  # fmt: skip
+    assert done.returncode in (130, -signal.SIGINT)
+    assert (done.stdout, done.stderr) == ("", "")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_library_leaves_ctrl_c_alone() -> None:
+    code = "import signal, env2mjcf, env2mjcf.cli.main as m; before = signal.getsignal(2); m.main(['--version'])\n"
+    check = "assert before is signal.getsignal(2) is signal.default_int_handler"
+    subprocess.run(
+        [sys.executable, "-c", code + check], env=folders.ENVIRONMENT, check=True, capture_output=True,
+        preexec_fn=interrupting.heed,
+    )  # fmt: skip
