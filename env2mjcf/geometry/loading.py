@@ -28,6 +28,9 @@ _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] =
 # Of what trimesh reads: formats that are one self-contained file of triangles.
 _THROUGH_TRIMESH = (".stl", ".ply", ".off", ".glb")
 
+# Volumes and inertias of larger meshes overflow; MuJoCo's own numbers end at 3e38.
+_LARGEST = 1e30
+
 READABLE = (*_READERS, *_THROUGH_TRIMESH)
 
 
@@ -58,6 +61,10 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
     else:
         log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
+    largest = float(np.abs(vertices).max())
+    if largest > _LARGEST:
+        message = f"{path} has a coordinate of {largest:.3g}; at most {_LARGEST:g} can be computed with"
+        log.fail(GeometryError, "GEO276", str(path), message, hint="is the file damaged, or in another format?")
     return Mesh.from_arrays(path.stem, vertices, faces, path)
 
 
