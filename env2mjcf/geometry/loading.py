@@ -15,7 +15,7 @@ from ..formats.byu import read_byu
 from ..formats.gms import read_gms
 from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
-from ..formats.source import wide_encoding
+from ..formats.source import read_at_most, wide_encoding
 from ..options import Limits
 from .mesh import Mesh
 
@@ -72,7 +72,7 @@ def _content(path: Path, log: DiagnosticLog, limits: Limits) -> bytes:
     try:
         with open(path, "rb") as file:
             # One byte more than allowed tells a large file without reading it.
-            data = file.read(limits.file_bytes + 1)
+            data = read_at_most(file, limits.file_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         log.fail(GeometryError, "GEO204", str(path), f"{path} cannot be read: {reason}")
