@@ -162,6 +162,7 @@ CATALOGUE: dict[str, str] = {
     "GEO273": "A mesh takes more work to repair and to cut into convex pieces than `limits.mesh_work`.",
     "GEO274": "A mesh file is UTF-16 or UTF-32 text.",
     "GEO275": "The bodies of a scene make more pairs that may touch than `limits.pairs`.",
+    "GEO276": "A mesh has coordinates that are too large to be computed with.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
     "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",

@@ -52,7 +52,7 @@ class Limits:
     polygon_work: int = 20_000_000
     scene_elements: int = 500_000_000
     scene_cells: int = 2_000_000
-    mesh_work: int = 1_000_000_000
+    mesh_work: int = 500_000_000
     pairs: int = 2_000_000
     rows: int = 5_000_000
     nesting: int = 100

@@ -222,7 +222,7 @@ class TestProgram:
         (file,) = report["files"]
         assert (file["path"], file["kind"]) == ("a.env", "scene")
         assert file["diagnostics"][0]["span"] == {
-            "path": "a.env", "line": 6, "column": 1, "length": 6, "text": "gone.g Planar Rotational",
+            "path": "a.env", "line": 6, "column": 1, "length": 6, "text": "gone.g Planar Rotational", "skipped": 0,
         }  # fmt: skip
 
     def test_for_github(self, folder, run):

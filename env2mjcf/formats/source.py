@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import IO, NoReturn
 
 from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
 from ..options import Limits, PathArgument
@@ -24,6 +24,8 @@ _MARKS = {b"\xff\xfe\0\0": "UTF-32", b"\0\0\xfe\xff": "UTF-32", b"\xff\xfe": "UT
 # Of four bytes of such text without a mark, those that are zero, for what is written in the Latin alphabet.
 _ZEROS: dict[tuple[int, ...], str] = {(1, 3): "UTF-16", (0, 2): "UTF-16", (1, 2, 3): "UTF-32", (0, 1, 2): "UTF-32"}
 _ENOUGH = 64
+# Bytes that are read at once.
+_PART = 1 << 20
 _SCENE_EXTENSIONS = (".env", ".xml", ".robot", ".query", ".path", ".map")
 
 
@@ -167,7 +169,7 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
             fail("ENV102", f"{name} is a folder; expected a file", f"name the file in it{holds}")
         with open(name, "rb") as file:
             # One more than allowed: the size that the system states is no bound for pipes and devices.
-            data = file.read(limits.file_bytes + 1)
+            data = read_at_most(file, limits.file_bytes + 1)
     except FileNotFoundError:
         others = _names_in(Path(name).parent)
         fail("ENV101", f"there is no file {name}", did_you_mean(Path(name).name, others) or "check the name")
@@ -182,6 +184,15 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
             Limits.hint("file_bytes"),
         )
     return data
+
+
+def read_at_most(file: IO[bytes], count: int) -> bytes:
+    """Read so many bytes of a file, or all that it has; `file.read` would make room for all of them at once."""
+    parts: list[bytes] = []
+    while count > 0 and (part := file.read(min(count, _PART))):
+        parts.append(part)
+        count -= len(part)
+    return b"".join(parts)
 
 
 def _names_in(folder: str | Path) -> list[str]:

@@ -15,7 +15,7 @@ from ..formats.byu import read_byu
 from ..formats.gms import read_gms
 from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
-from ..formats.source import wide_encoding
+from ..formats.source import read_at_most, wide_encoding
 from ..options import Limits
 from .mesh import Mesh
 
@@ -27,6 +27,9 @@ _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] =
 
 # Of what trimesh reads: formats that are one self-contained file of triangles.
 _THROUGH_TRIMESH = (".stl", ".ply", ".off", ".glb")
+
+# Volumes and inertias of larger meshes overflow; MuJoCo's own numbers end at 3e38.
+_LARGEST = 1e30
 
 READABLE = (*_READERS, *_THROUGH_TRIMESH)
 
@@ -58,6 +61,10 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
     else:
         log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
+    largest = float(np.abs(vertices).max())
+    if largest > _LARGEST:
+        message = f"{path} has a coordinate of {largest:.3g}; at most {_LARGEST:g} can be computed with"
+        log.fail(GeometryError, "GEO276", str(path), message, hint="is the file damaged, or in another format?")
     return Mesh.from_arrays(path.stem, vertices, faces, path)
 
 
@@ -65,7 +72,7 @@ def _content(path: Path, log: DiagnosticLog, limits: Limits) -> bytes:
     try:
         with open(path, "rb") as file:
             # One byte more than allowed tells a large file without reading it.
-            data = file.read(limits.file_bytes + 1)
+            data = read_at_most(file, limits.file_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         log.fail(GeometryError, "GEO204", str(path), f"{path} cannot be read: {reason}")
