@@ -9,10 +9,10 @@ from random import Random
 from typing import Any
 
 import numpy as np
+import pytest
 import trimesh
 from hypothesis import strategies as st
 from meshes import voxels
-from scipy.spatial import ConvexHull
 
 from env2mjcf.dialects import RULES, VOCABULARIES
 from env2mjcf.model import (
@@ -238,9 +238,10 @@ def solids(draw: Any) -> Solid:
     """Draw a hull of random points, or a heap of the cells of a grid with uneven spacing."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     if draw(st.booleans()):
+        spatial = pytest.importorskip("scipy.spatial", reason="no scipy to make hulls with")
         hull = trimesh.convex.convex_hull(rng.normal(size=(draw(st.integers(5, 30)), 3)))
         # By its planes and their areas, not by sums over its corners as readers do.
-        planes = ConvexHull(hull.vertices)
+        planes = spatial.ConvexHull(hull.vertices)
         return Solid(np.array(hull.vertices), np.array(hull.faces), float(planes.volume))
     planes = [np.cumsum(rng.uniform(0.2, 1, size=draw(st.integers(2, 4)))) for _ in range(3)]
     filled = rng.random([len(p) - 1 for p in planes]) < draw(st.sampled_from([0.3, 0.6, 1.0]))

@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from extras import skip_without
 
 from env2mjcf import load
 from env2mjcf.cli import info as info_module
@@ -419,6 +420,7 @@ class TestExitStatus:
         ],
     )  # fmt: skip
     def test_a_scene_in_which_nothing_moves_is_3_and_said_to_be_one(self, words, folder, run):
+        skip_without("planning" if words[0] == "plan" else "view")
         (folder / "e.env").write_text("Boundary Box [-9:9; -9:9; -9:9]\nMultibodies\n1\nPassive\ncube.g 0 0 0 0 0 0\n")
         (folder / "q").write_text("1 2 3\n")
         result = run(*words)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from extras import needs, skip_without
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
@@ -126,8 +127,7 @@ class TestThreads:
         ("path", "engine"), [(ALPHA, "exact"), (CAR, "exact"), (ARM, "mujoco")], ids=["alpha", "cars", "arm"]
     )
     def test_that_ask_everything_at_once_are_answered_as_one_thread_is(self, path: Path, engine: str) -> None:
-        if engine == "exact":
-            pytest.importorskip("numba")
+        skip_without("fast")
         q = rows(env2mjcf.load(path))
         expected = answers(env2mjcf.load(path, engine=engine), q)
         # Fresh: what queries need is not made yet, and is made by whoever comes first.
@@ -157,7 +157,7 @@ class TestThreads:
                 assert found == alone[number % 2]
 
     def test_that_plan_get_the_ways_of_their_seeds(self) -> None:
-        pytest.importorskip("ompl")
+        skip_without("planning")
         scene = env2mjcf.load(ALPHA)
         q = scene.space.sample(60, seed=0)
         q = q[scene.is_valid(q)]
@@ -170,6 +170,7 @@ class TestThreads:
         with ThreadPoolExecutor(4) as pool:
             assert list(pool.map(way, range(4))) == alone
 
+    @needs("fast")
     def test_of_asyncio_may_ask(self) -> None:
         scene = env2mjcf.load(ALPHA)
         q = rows(scene)
@@ -196,6 +197,7 @@ class TestThreads:
         assert found == [expected]
         assert gone() is None
 
+    @needs("fast")
     def test_with_scenes_of_the_same_names_do_not_mix_them(self, tmp_path: Path) -> None:
         """Names of files, bodies and meshes are the same; where things are is not."""
         scenes = [
@@ -232,6 +234,7 @@ class TestProcesses:
             there = pool.starmap(env2mjcf.Scene.in_collision, [(scene, row) for row in q])
         assert there == scene.in_collision(q).tolist()
 
+    @needs("fast")
     def test_a_copy_answers_alike_and_has_a_state_of_its_own(self) -> None:
         scene = env2mjcf.load(ARM)
         q = rows(scene)
@@ -244,6 +247,7 @@ class TestProcesses:
 
 
 class TestForks:
+    @needs("fast")
     def test_child_and_parent_answer_alike_whatever_ran_before(self) -> None:
         scene = env2mjcf.load(ALPHA)
         q = rows(scene)
@@ -262,7 +266,7 @@ class TestForks:
             assert in_child(lambda: (fresh.clearance(q[:4]).tolist() == expected, fresh.data.time)) == "(True, 0.0)"
 
     def test_a_process_is_not_forked_while_the_engine_compiles(self) -> None:
-        pytest.importorskip("numba")
+        skip_without("fast")
         from numba.core.compiler_lock import global_compiler_lock
 
         class Compiling:
@@ -286,13 +290,13 @@ class TestForks:
 
     def test_a_child_that_is_forked_while_a_scene_warms_up_can_use_it(self) -> None:
         """In a process of its own, in which nothing has imported numba yet."""
-        pytest.importorskip("numba")
+        skip_without("fast")
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(1, mp_context=context) as pool:
             assert pool.submit(warm_and_fork).result() == ["True"] * 4
 
     def test_a_child_plans_what_its_parent_plans(self) -> None:
-        pytest.importorskip("ompl")
+        skip_without("planning")
         scene = env2mjcf.load(ALPHA)
         q = scene.space.sample(60, seed=0)
         q = q[scene.is_valid(q)]
@@ -333,7 +337,7 @@ def warm_and_fork() -> list[str]:
 
 def test_read_only_rows_do_not_compile_the_engine_again() -> None:
     """Home is read-only; to numba such an array is of another type, and compiling takes a minute."""
-    pytest.importorskip("numba")
+    skip_without("fast")
     from env2mjcf.contact.exact.kernels import entries
 
     scene = env2mjcf.load(ALPHA)

@@ -135,6 +135,7 @@ def test_an_impossible_film_says_what_is_possible(
     assert not list(tmp_path.iterdir())
 
 
+@needs_view
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -154,12 +155,14 @@ def test_an_argument_of_a_wrong_kind_is_named(
     assert not list(tmp_path.iterdir())
 
 
+@needs_view
 def test_no_gif_is_quicker_than_players_play_it() -> None:
     with pytest.raises(ValueError, match="fps is 51"):
         encoder("a.GIF", 51)
     encoder("a.gif", 50)
 
 
+@needs_view
 @pytest.mark.parametrize("fps", [30, 45, 50])
 def test_a_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: int) -> None:
     from PIL import Image

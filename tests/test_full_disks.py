@@ -15,6 +15,7 @@ from pathlib import Path
 import folders
 import numpy as np
 import pytest
+from extras import needs
 from scenes import free_cube, write_scene
 
 import env2mjcf
@@ -44,9 +45,20 @@ VERBS = {
     "check": (["check", "scene.env", "a.path", "--picture"], "a.png", "CFG552"),
 }
 DRAWING = ("render", "play mp4", "play gif", "check")
-some_verbs = pytest.mark.parametrize(
-    "verb", [v if v not in DRAWING or GL else pytest.param(v, marks=pytest.mark.skip("no GL")) for v in VERBS]
-)
+
+
+def marks(verb: str) -> list[pytest.MarkDecorator]:
+    """Return what skips a verb for which something is missing."""
+    if verb in DRAWING:
+        return [needs("view")] if GL else [pytest.mark.skip("no GL")]
+    return [needs("planning")] if verb == "plan" else []
+
+
+def of_verbs(*verbs: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("verb", [pytest.param(verb, marks=marks(verb)) for verb in verbs])
+
+
+some_verbs = of_verbs(*VERBS)
 
 
 @pytest.fixture(scope="module")
@@ -164,12 +176,12 @@ def test_a_folder_that_may_not_be_written_is_said(verb: str, inputs: Path, tmp_p
     assert content(tmp_path) == before
 
 
-@pytest.mark.parametrize("verb", ["convert", "batch", "plan", "translate"])
+@of_verbs("convert", "batch", "plan", "translate")
 def test_a_place_where_no_file_can_be_is_said(verb: str, inputs: Path) -> None:
     judged(run(verb, inputs, Path("/proc")), verb, "")
 
 
-@pytest.mark.parametrize("verb", ["plan", "batch"])
+@of_verbs("plan", "batch")
 def test_a_device_is_not_replaced_by_a_file(verb: str, inputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(VERBS, verb, (VERBS[verb][0], "null", VERBS[verb][2]))
     judged(run(verb, inputs, Path("/dev")), verb, "is no regular file")
@@ -180,6 +192,7 @@ def test_a_device_is_not_replaced_by_a_file(verb: str, inputs: Path, monkeypatch
     assert not list(Path("/dev").glob(".*"))
 
 
+@needs("planning")
 def test_a_plan_does_not_replace_what_is_no_path(inputs: Path, tmp_path: Path) -> None:
     for name, text in (("b.path", "my notes\n"), ("b.approach.path", "my other notes\n"), ("b.path", "\0\1\2")):
         (tmp_path / name).write_text(text)
@@ -192,6 +205,7 @@ def test_a_plan_does_not_replace_what_is_no_path(inputs: Path, tmp_path: Path) -
         assert (tmp_path / "b.path").read_text() != text
 
 
+@needs("view")
 def test_every_writer_says_that_the_disk_is_full(inputs: Path, full_disk: Path) -> None:
     scene = env2mjcf.load(inputs / "scene.env", engine="mujoco")
     writers = {

@@ -23,6 +23,7 @@ from weakref import WeakKeyDictionary, WeakSet
 import mujoco
 import numpy as np
 import pytest
+from extras import needs, skip_without
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
@@ -97,6 +98,7 @@ def tables() -> dict[str, object]:
     return found
 
 
+@needs("fast")
 def test_modules_hold_no_state_but_what_is_listed_here(tmp_path: Path) -> None:
     """Tables that are never written to are constants, whatever their type; all else has a reason above."""
     constants = {n: repr(v) for n, v in tables().items() if n not in CHANGING and isinstance(v, (dict, list, set))}
@@ -169,6 +171,7 @@ def _umask() -> int:
     return mask
 
 
+@needs("fast")
 def test_the_process_is_as_it_was_after_every_kind_of_call(tmp_path: Path) -> None:
     before = Recorded()
     everything(tmp_path)
@@ -185,7 +188,7 @@ def test_the_process_is_as_it_was_after_planning_and_pictures() -> None:
     before = Recorded()
     if offscreen.backend() is not None:
         picture(scene, size=(32, 24))
-    pytest.importorskip("ompl")
+    skip_without("planning")
     alpha = env2mjcf.load(ALPHA)
     q = alpha.space.sample(60, seed=0)
     q = q[alpha.is_valid(q)]
@@ -225,6 +228,7 @@ def bad_calls(scene: env2mjcf.Scene, folder: Path) -> list[Callable[[], object]]
     ]
 
 
+@needs("fast")
 def test_a_call_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
     scene = env2mjcf.load(ALPHA)
     q = scene.space.sample(12, seed=2)
