@@ -14,7 +14,6 @@ from types import FrameType
 interrupted = False
 """Whether Ctrl-C was pressed: what goes wrong afterwards may go wrong because of it."""
 
-
 _ours = False
 
 
@@ -28,7 +27,7 @@ def is_program() -> bool:
 
 def end_at_once() -> None:
     """Let Ctrl-C end the process without a word; what is ignored stays ignored."""
-    global _ours  # noqa: PLW0603  as above
+    global _ours  # noqa: PLW0603  a process has one handler
     if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _interrupt):
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         _ours = True

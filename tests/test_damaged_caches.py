@@ -158,9 +158,9 @@ def _entries():
     return collisions
 collisions = _entries()
 if __name__ != "__main__":
-    from env2mjcf.contact.exact.engine import _call
+    from env2mjcf.contact.exact.compiled import call
     out = np.zeros(3, dtype=np.bool_)
-    _call(collisions, np.array([1.0, -1.0, 2.0]), out)
+    call(collisions, np.array([1.0, -1.0, 2.0]), out)
     print(out.tolist(), sum(collisions.stats.cache_hits.values()))
 """
 

@@ -38,7 +38,7 @@ CHANGING = {
     "env2mjcf.contact.remote._memory": "the scenes that a worker process was sent, by the digest of all they hold",
     "env2mjcf.contact.remote._parcels": "scenes as bytes, while the scenes live",
     "env2mjcf.forking._locks": "all locks, while they live: a forked child opens them",
-    "env2mjcf.contact.exact.engine._loading": "held while numba is imported or compiles",
+    "env2mjcf.contact.exact.compiled._loading": "held while numba is imported or compiles",
     "env2mjcf.planning.planning._one_at_a_time": "held while OMPL plans: its random numbers are the process's",
     "env2mjcf.geometry.cache._provenance": "a cache: the digest of the geometry code",
     "env2mjcf.geometry.loading._READERS": "readers of meshes by file ending; filled on import",

@@ -63,6 +63,7 @@ def _mp4(file: Path, pictures: Pictures, fps: int) -> None:
         # What every browser and every player shows; sharp edges need a little more than the usual quality of 25.
         "-an", "-codec:v", "libx264", "-crf", "15", "-pix_fmt", "yuv420p", "-movflags", "+faststart", f"file:{file}",
     ]  # fmt: skip
+    # Run here and not by imageio_ffmpeg, which does not say that ffmpeg failed: a full disk left half a film.
     # Ctrl-C is for this process, which stops the encoder.
     group = 0 if os.name == "posix" else None
     with tempfile.TemporaryFile() as errors:

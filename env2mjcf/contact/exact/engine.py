@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import threading
 import time
 from collections.abc import Sequence
-from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +14,7 @@ from ...pairs import Pair
 from ...space import ConfigurationSpace
 from ...transforms import Array
 from ..surfaces import Surfaces
+from .compiled import call, entries
 from .program import program
 from .tables import Table, packed
 
@@ -35,77 +30,6 @@ def require() -> None:
     """Raise a ValueError that says what to install, unless the engine is available."""
     if not available():
         raise ValueError("engine='exact' needs one more package: pip install 'env2mjcf[fast]'")
-
-
-def _entries() -> Any:
-    # Imported here, because numba takes its time to import, and is an extra.
-    with _loading:
-        try:
-            return import_module(".kernels.entries", __package__)
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            raise ValueError(
-                "the exact engine finds no folder to keep what it compiles: name one that may be written with "
-                "NUMBA_CACHE_DIR, or choose engine='mujoco'"
-            ) from error
-
-
-class _Loading:
-    """Held while the engine is imported; a process is not forked before that is done, nor while numba compiles.
-
-    Numba's lock, and Python's own of modules that are being imported, would stay locked in the child. Unlike what
-    `forking.Lock` guards, what they guard cannot be begun anew.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.RLock()
-        self._compiling: Any = None
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
-
-    def before_fork(self) -> None:
-        """Wait until nothing is imported or compiled, and keep it so."""
-        self._lock.acquire()
-        # Not imported by anybody: then nothing compiles.
-        module = sys.modules.get("numba.core.compiler_lock")
-        self._compiling = getattr(module, "global_compiler_lock", None)
-        if self._compiling is not None:
-            self._compiling.acquire()
-
-    def after_fork(self) -> None:
-        """Go on, in the parent and in the child."""
-        if self._compiling is not None:
-            self._compiling.release()
-        self._lock.release()
-
-
-_loading = _Loading()
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(
-        before=_loading.before_fork, after_in_parent=_loading.after_fork, after_in_child=_loading.after_fork
-    )
-
-
-def _call(entry: Any, *arguments: Any) -> None:
-    """Call a compiled function; if that fails, forget what is kept of it on the disk, and compile it anew.
-
-    Compiled functions raise nothing; what numba has written to the disk may be damaged, and then numba says so in words
-    of its own. It has no checksum, so damage that can still be read is not found.
-    """
-    try:
-        entry(*arguments)
-    except Exception:
-        kept = list(Path(entry.stats.cache_path).glob(f"entries.*.{entry.__name__}-*.nbi"))
-        if not kept:
-            raise
-        for file in kept:
-            file.unlink(missing_ok=True)
-        entry(*arguments)
 
 
 class ExactEngine:
@@ -126,7 +50,7 @@ class ExactEngine:
     ) -> None:
         require()
         self._tables = program(assembly, space, pairs, surfaces)
-        self._entries = _entries()
+        self._entries = entries()
         self._collisions = self._entries.collisions
 
     def collisions(self, q: Array) -> Bools:
@@ -136,26 +60,26 @@ class ExactEngine:
         try:
             self._collisions(*self._tables, _plain(q), out)
         except Exception:
-            _call(self._collisions, *self._tables, _plain(q), out)
+            call(self._collisions, *self._tables, _plain(q), out)
         return out
 
     def validities(self, q: Array) -> Bools:
         """Return whether configurations are within limits and the boundary, and no pair touches, (n,)."""
         out = np.empty(len(q), dtype=np.bool_)
-        _call(self._entries.validities, *self._tables, _plain(q), out)
+        call(self._entries.validities, *self._tables, _plain(q), out)
         return out
 
     def distances(self, q: Array) -> Array:
         """Return the least distance of any pair, (n,); inf without pairs, -1 where any touches."""
         out = np.empty(len(q))
-        _call(self._entries.distances, *self._tables, _plain(q), out)
+        call(self._entries.distances, *self._tables, _plain(q), out)
         return out
 
     def edges_collide(self, start: Array, delta: Array, steps: NDArray[np.int64]) -> Bools:
         """Return whether any pair touches at one of so many steps, (e,), of ways from (e, dim) by (e, dim)."""
         out = np.empty(len(start), dtype=np.bool_)
         start, delta = _plain(start), _plain(delta)
-        _call(self._entries.edges_collide, *self._tables, start, delta, steps, out)
+        call(self._entries.edges_collide, *self._tables, start, delta, steps, out)
         return out
 
     def edges_are_free(
@@ -174,7 +98,7 @@ class ExactEngine:
         """
         out = np.empty(len(start), dtype=np.bool_)
         start, delta = _plain(start), _plain(delta)
-        _call(self._entries.edges_are_free, *self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
+        call(self._entries.edges_are_free, *self._tables, start, delta, speeds, drifts, turns, pair_speeds, band, out)
         return out
 
 
@@ -190,11 +114,11 @@ def compile_all() -> float:
     """
     start = time.perf_counter()
     nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
-    entries, tables = _entries(), packed(nothing)
+    kernels, tables = entries(), packed(nothing)
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
-    _call(entries.collisions, *tables, rows, answers)
-    _call(entries.validities, *tables, rows, answers)
-    _call(entries.distances, *tables, rows, floats)
-    _call(entries.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
-    _call(entries.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
+    call(kernels.collisions, *tables, rows, answers)
+    call(kernels.validities, *tables, rows, answers)
+    call(kernels.distances, *tables, rows, floats)
+    call(kernels.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
+    call(kernels.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start
