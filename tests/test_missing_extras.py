@@ -22,10 +22,15 @@ EVERYTHING = tuple(name for names in PACKAGES.values() for name in names)
 SEED, MAZE, BUG_TRAP = (str(MODELS / p) for p in ("seed/seed.env", "maze/maze.xml", "bug-trap/bug-trap.env"))
 NEEDS = {
     ("check", MAZE, "--engine", "exact"): "fast",
+    ("batch", SEED, "x.npy", "-o", "y.npy", "--engine", "exact"): "fast",
+    ("convert", SEED, "x", "--engine", "exact"): "fast",
+    ("cache", "warm"): "fast",
     ("render", SEED, "-o", "x.png"): "view",
     ("play", SEED, "x.path", "-o", "x.mp4"): "view",
+    ("play", SEED, "x.path", "-o", "x.gif"): "view",
     ("view", SEED): "view",
     ("plan", MAZE): "planning",
+    ("plan", MAZE, "--planner", "RRTConnect"): "planning",
     ("batch", SEED, "x.npy", "-o", "y.npy", "--dask", "tcp://127.0.0.1:1"): "dask",
     ("convert", BUG_TRAP, "x", "--collision", "coacd"): "decompose",
 }

@@ -64,11 +64,7 @@ class Cache:
     def _warm(self) -> int:
         from ..contact.exact.engine import compile_all, require
 
-        try:
-            require()
-        except ValueError as error:
-            print(f"env2mjcf: cache: {one_line(str(error))}", file=sys.stderr)
-            return 3
+        require()
         seconds = compile_all()
         if self.output.json:
             print_json({"seconds": seconds})
