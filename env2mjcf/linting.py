@@ -22,12 +22,12 @@ from .formats.robot import read_robot
 from .formats.source import read_source
 from .formats.xml import parse_xml
 from .geometry.loading import READABLE, load_mesh
-from .geometry.repair import repair_diagnostics, repaired
+from .geometry.repair import refuse_work, repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
-from .geometry.work import TooMuchWorkError, Work, refuse_work
 from .kinematics import RobotKinematics
 from .model import Body, Environment, MultiBody, MultiBodyKind
 from .options import Options, PathArgument
+from .work import TooMuchWorkError, Work
 
 _ROOT_TAG = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*<([A-Za-z_][\w:.\-]*)", re.DOTALL)
 _SCENE_TAGS = ("environment", "motionplanning", "motion_planning", "mpproblem", "problem")

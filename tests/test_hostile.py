@@ -26,8 +26,8 @@ from env2mjcf.formats.source import Source
 from env2mjcf.geometry.loading import load_mesh
 from env2mjcf.geometry.mesh import Mesh
 from env2mjcf.geometry.repair import repaired
-from env2mjcf.geometry.work import TooMuchWorkError, Work
 from env2mjcf.options import Limits
+from env2mjcf.work import TooMuchWorkError, Work
 
 BOX = "Boundary Box [0:1;0:1;0:1]\nMultibodies\n"
 CUBE = "1 8 12 36\n1 12\n" + "".join(f"{x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Limits
+from ..work import TooMuchWorkError, Work
 from .lexer import number_hint
 from .numbers import Numbers, find_numbers, span_of
-from .polygons import TooMuchWorkError, triangulate
+from .polygons import triangulate
 
 # Vertices (n, 3) and triangles (m, 3): what every mesh reader returns.
 MeshArrays = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -171,10 +172,10 @@ def faces_of(
         log.fail(GeometryError, "GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
     try:
         faces, crossing = triangulate(
-            vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], limits.polygon_work
+            vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], Work(limits.polygon_work)
         )
     except TooMuchWorkError as stopped:
-        worst = int(kept[stopped.polygon])
+        worst = int(kept[stopped.polygon or 0])
         log.fail(
             GeometryError,
             "GEO270",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
+
+from ..work import TooMuchWorkError, Work
 
 Vectors = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -14,20 +14,8 @@ Indices = NDArray[np.int64]
 _FLAT = 1e-12
 
 
-class TooMuchWorkError(Exception):
-    """Cutting takes more work than is allowed.
-
-    Args:
-        polygon: The one at which the work was spent.
-    """
-
-    def __init__(self, polygon: int) -> None:
-        super().__init__(polygon)
-        self.polygon = polygon
-
-
 def triangulate(
-    vertices: Vectors, corners: Indices, counts: Indices, work: float = math.inf
+    vertices: Vectors, corners: Indices, counts: Indices, work: Work | None = None
 ) -> tuple[Indices, list[int]]:
     """Cut polygons into triangles that keep every edge and the orientation of their polygon.
 
@@ -38,15 +26,16 @@ def triangulate(
         vertices: (n, 3) points.
         corners: Indices into `vertices`, polygon after polygon.
         counts: Number of corners of each polygon, at least 3.
-        work: How many points may be looked at in search of ears.
+        work: How many points may be looked at in search of ears; None sets no bound.
 
     Returns:
         (m, 3) triangles in the order of the polygons, and the polygons found to cross themselves, what was left of
         each cut as a fan.
 
     Raises:
-        TooMuchWorkError: More points would have to be looked at.
+        TooMuchWorkError: More points would have to be looked at; it names the polygon.
     """
+    work = work or Work()
     first_corner = np.cumsum(counts) - counts
     first_face = np.cumsum(counts - 2) - (counts - 2)
     faces = np.empty((int((counts - 2).sum()), 3), dtype=np.int64)
@@ -59,10 +48,11 @@ def triangulate(
             continue
         flat = _flattened(vertices[polygons])
         for row in np.flatnonzero(~_convex(flat)).tolist():
-            triples, whole, looked_at = _clip_ears(flat[row], work)
-            work -= looked_at
-            if work < 0:
-                raise TooMuchWorkError(int(which[row]))
+            try:
+                triples, whole = _clip_ears(flat[row], work)
+            except TooMuchWorkError as stopped:
+                stopped.polygon = int(which[row])
+                raise
             start = int(first_face[which[row]])
             faces[start : start + n - 2] = polygons[row][triples]
             if not whole:
@@ -105,17 +95,13 @@ def _convex(flat: Vectors) -> NDArray[np.bool_]:
     return (cross > _FLAT).all(axis=1) & (turn < 3 * np.pi)
 
 
-def _clip_ears(points: Vectors, work: float) -> tuple[Indices, bool, int]:
-    """Cut one (n, 2) polygon, or stop when more points than `work` were looked at.
-
-    Returns:
-        (n - 2, 3) positions, False where it crosses itself, and how many points were looked at.
-    """
+def _clip_ears(points: Vectors, work: Work) -> tuple[Indices, bool]:
+    """Cut one (n, 2) polygon; return (n - 2, 3) positions, and False where it crosses itself."""
     ring = list(range(len(points)))
     triples: list[tuple[int, int, int]] = []
-    at, misses, looked_at = 0, 0, 0
-    while len(ring) > 3 and misses < len(ring) and looked_at <= work:
-        looked_at += len(ring)
+    at, misses = 0, 0
+    while len(ring) > 3 and misses < len(ring):
+        work.spend(len(ring))
         ear = (ring[at - 1], ring[at], ring[(at + 1) % len(ring)])
         if _is_ear(points, ear, ring):
             triples.append(ear)
@@ -129,7 +115,7 @@ def _clip_ears(points: Vectors, work: float) -> tuple[Indices, bool, int]:
     areas = _doubled_areas(points[fan])
     # What is left of a polygon that does not cross itself is a triangle, or has no area.
     whole = bool((areas >= -_FLAT).all()) and (len(ring) == 3 or bool((areas <= _FLAT).all()))
-    return np.concatenate([np.array(triples, dtype=np.int64).reshape(-1, 3), fan]), whole, looked_at
+    return np.concatenate([np.array(triples, dtype=np.int64).reshape(-1, 3), fan]), whole
 
 
 def _is_ear(points: Vectors, ear: tuple[int, int, int], ring: list[int]) -> bool:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
+from ..work import Work
 from .cleaning import cleaned
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
 from .orientation import inside_out, rewound, wound_alike
 from .topology import RELATIVE_TOLERANCE, Floats, Ints, edges, face_areas, face_components, face_volumes
-from .work import Work
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,16 +15,16 @@ from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
 from ..options import Limits, Options
 from ..transforms import Array
+from ..work import TooMuchWorkError, Work
 from .analysis import Analysis
 from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .loading import load_mesh
 from .mesh import Mesh
-from .repair import Repaired, repair_diagnostics, repaired
+from .repair import Repaired, refuse_work, repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
-from .work import TooMuchWorkError, Work, refuse_work
 
 # Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
 _THICKNESS_PER_EXTENT = 5e-6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..work import Work
 from .topology import Bools, Edges, Floats, Ints, connected, edges
-from .work import Work
 
 _BLOCK = 2_000_000  # solid angles held in memory at once
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
 from ..options import Collision
+from ..work import Work
 from .analysis import Analysis, refuse_without_area
 from .cache import GeometryCache
 from .convexity import is_convex
@@ -20,7 +21,6 @@ from .pieces import ConvexPiece, hull_piece, prisms
 from .polygons import Polygon, convex_polygons
 from .shells import Shells, shells
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
-from .work import Work
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..work import COSTLY, Work
 from .topology import Bools, Floats, Ints
 from .triangle_distance import nearest
 from .triangle_tree import Forest
-from .work import COSTLY, Work
 
 # Pairs of triangles whose exact distance is taken at once: the first ones tighten the bound for the others.
 _BLOCK = 512

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...work import Work
 from ..analysis import Analysis
 from ..pieces import SLENDEREST, ConvexPiece, prisms, too_narrow
 from ..polygons import Polygon, convex_polygons
 from ..topology import Ints
-from ..work import Work
 from .corners import cell_corners
 from .doubts import doubtful_polygons
 from .pairing import pair_sides

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...work import Work
 from ..analysis import Analysis
 from ..orientation import winding_numbers
 from ..pieces import ConvexPiece
 from ..polygons import Polygon
 from ..topology import Floats, Ints, connected
-from ..work import Work
 from .pairing import Sides
 
 

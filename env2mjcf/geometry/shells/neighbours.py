@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...work import Work
 from ..topology import Floats, Ints
-from ..work import Work
 
 _BLOCK = 64
 

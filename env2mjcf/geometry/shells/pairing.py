@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...work import Work
 from ..topology import Floats, Ints, edges
-from ..work import Work
 
 # Angles in radians below which two faces coincide: the solid that touches here is another one.
 _COINCIDENT = 1e-6

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...work import COSTLY, Work
 from ..topology import Bools, Floats, Ints
-from ..work import COSTLY, Work
 from .clipping import clipped
 from .neighbours import near
 from .walls import Group

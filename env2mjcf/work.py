@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import NoReturn
-
-from ..errors import DiagnosticLog, GeometryError, Span
-from ..options import Limits
 
 COSTLY = 10
 """Steps that a comparison counts for which clips polygons."""
 
 
 class TooMuchWorkError(Exception):
-    """More steps were asked for than are allowed."""
+    """More steps were asked for than are allowed.
+
+    Attributes:
+        polygon: Index of the one that they were asked for, where it is one.
+    """
+
+    polygon: int | None = None
 
 
 class Work:
@@ -36,14 +38,3 @@ class Work:
         self.done += steps
         if self.done > self.most:
             raise TooMuchWorkError
-
-
-def refuse_work(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None) -> NoReturn:
-    """Raise a `GeometryError` about a mesh that takes too much work."""
-    log.fail(
-        GeometryError, "GEO273", subject,
-        f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its parts "
-        "would have to be compared",
-        hint=f"remove parts that overlap, choose collision='hull' (--collision hull), or {Limits.hint('mesh_work')}",
-        span=span,
-    )  # fmt: skip
