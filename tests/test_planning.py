@@ -21,7 +21,7 @@ from env2mjcf.cli.main import main
 
 pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
-from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
+from env2mjcf.planning import PLANNERS, Plan, plan, plan_through, validity
 from env2mjcf.planning.bridge import state_space
 from env2mjcf.planning.result import Progress
 from env2mjcf.planning.shortening import shortened
@@ -480,3 +480,11 @@ def test_benchmarks_are_solved_and_triangles_agree(name: str):
     found = plan(scene, query.q[0], query.q[-1], robot=query.robot, time=120)
     assert_leads(scene, found, query.q[0], query.q[-1])
     assert_free_by_triangles(scene, found.path, 0.01 * scene.extent)
+
+
+def test_long_motions_leave_nothing_in_memory() -> None:
+    kept = validity._remembered.cache_info().currsize
+    for steps in range(5000, 5100):
+        assert sorted(validity._bisecting(steps)[:, 0] * steps) == pytest.approx(range(1, steps + 1))
+    assert validity._remembered.cache_info().currsize == kept
+    assert validity._remembered.cache_info().maxsize * 8 * validity._SHORT < 4e6

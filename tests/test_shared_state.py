@@ -42,7 +42,7 @@ CHANGING = {
     "env2mjcf.planning.planning._one_at_a_time": "held while OMPL plans: its random numbers are the process's",
     "env2mjcf.geometry.cache._provenance": "a cache: the digest of the geometry code",
     "env2mjcf.geometry.loading._READERS": "readers of meshes by file ending; filled on import",
-    "env2mjcf.planning.validity._bisecting": "a cache of at most 4096 read-only arrays, by their lengths",
+    "env2mjcf.planning.validity._remembered": "a cache of at most 512 read-only arrays, of 512 numbers at most",
     "env2mjcf.view.offscreen._backend": "a cache: the GL backend, by what MUJOCO_GL asks for",
     "env2mjcf.testing._numbered": "numbers of pictures, by the name of the test that failed",
 }

@@ -15,6 +15,9 @@ from .space import PlanningSpace
 # A motion is looked at in rounds: most invalid ones show in the first few configurations, and a round costs as much
 # as some ten of them.
 _ROUND, _GROWTH = 2, 4
+# The times of motions of so many steps are kept; longer motions are each of a length of their own, and what would be kept
+# for them would fill the memory.
+_SHORT = 512
 
 
 class Validity:
@@ -73,16 +76,19 @@ class Validity:
         return good
 
 
-@lru_cache(maxsize=4096)
 def _bisecting(steps: int) -> Array:
     """Return the times 1/n to 1, (n, 1): the last, then halves, quarters, and so on: each once."""
-    indices = [steps]
-    stride = 1
-    while stride < steps:
-        stride *= 2
-    while stride > 1:
-        indices.extend(range(stride // 2, steps, stride))
-        stride //= 2
-    times = np.array(indices, dtype=np.float64)[:, None] / steps
+    return _remembered(steps) if steps <= _SHORT else _times(steps)
+
+
+@lru_cache(maxsize=_SHORT)
+def _remembered(steps: int) -> Array:
+    return _times(steps)
+
+
+def _times(steps: int) -> Array:
+    strides = [1 << k for k in range((steps - 1).bit_length(), 0, -1)]
+    indices = np.concatenate([[steps], *(np.arange(stride // 2, steps, stride) for stride in strides)])
+    times = indices[:, None] / steps
     times.setflags(write=False)
     return times
