@@ -15,8 +15,8 @@ from .space import PlanningSpace
 # A motion is looked at in rounds: most invalid ones show in the first few configurations, and a round costs as much
 # as some ten of them.
 _ROUND, _GROWTH = 2, 4
-# The times of motions of so many steps are kept; longer motions are each of a length of their own, and what would be kept
-# for them would fill the memory.
+# Times of motions of at most so many steps are kept. Longer motions are each of a length of their own: what was kept of
+# them would fill the memory.
 _SHORT = 512
 
 
