@@ -32,6 +32,8 @@ PER_OPERATION = 4_000
 LEAST = 8_000_000
 # Scenes that everything is done with before anything is measured: what is loaded or made once does not count.
 _WARMED = 3
+# Readings that tell growth from chance, also of a short run on a machine that is busy.
+_ENOUGH = 12
 
 # An operation, and how often it comes.
 Chosen = tuple[Callable[[Known], None], int]
@@ -68,7 +70,7 @@ class Soak:
                 self._do(name, operation, known)
         self._work(chosen, seconds / 4, every)
         self.readings.clear()
-        self._work(chosen, seconds, every)
+        self._work(chosen, seconds, every, _ENOUGH)
         self.findings += grown(self.readings)
         steady = steady_slope(self.readings, "memory")
         if steady > PER_OPERATION and steady * self.span() > self.least:
@@ -99,10 +101,10 @@ class Soak:
             f"{first.objects} to {last.objects}; {len(self.findings)} findings"
         )
 
-    def _work(self, chosen: Mapping[str, Chosen], seconds: float, every: float) -> None:
+    def _work(self, chosen: Mapping[str, Chosen], seconds: float, every: float, readings: int = 0) -> None:
         names, weights = list(chosen), [weight for _, weight in chosen.values()]
         end, due = time.monotonic() + seconds, time.monotonic()
-        while time.monotonic() < end:
+        while time.monotonic() < end or len(self.readings) < readings:
             (name,) = self.rng.choices(names, weights)
             self._do(name, chosen[name][0], self.rng.choice(self.known))
             if time.monotonic() >= due:

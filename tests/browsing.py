@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from extras import skip_without
+from interrupting import heed
 
 ROOT = Path(__file__).parents[1]
 # Drawn in software, without a screen, and without asking anybody for anything.
@@ -44,7 +45,13 @@ def viewing(*arguments: str | Path) -> Iterator[str]:
     skip_without("view")
     command = [sys.executable, "-m", "env2mjcf", "view", *map(str, arguments), "--no-browser"]
     process = subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
+        command,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        preexec_fn=heed,  # noqa: PLW1509  it only sets a signal
     )
     assert process.stdout is not None
     try:
