@@ -9,12 +9,15 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from types import FrameType
 
 interrupted = False
 """Whether Ctrl-C was pressed: what goes wrong afterwards may go wrong because of it."""
 
 _ours = False
+# Seconds; by then the callback has returned.
+_SOON = 0.05
 
 
 def is_program() -> bool:
@@ -37,9 +40,26 @@ def end_tidily() -> None:
     """Let Ctrl-C raise a KeyboardInterrupt again, if `end_at_once` has changed that."""
     if _ours and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, _interrupt)
+        sys.unraisablehook = _unraisable
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
     global interrupted  # noqa: PLW0603  a process has one Ctrl-C
     interrupted = True
     raise KeyboardInterrupt
+
+
+def _unraisable(found: sys.UnraisableHookArgs) -> None:
+    """Interrupt once more where a library's callback, such as one of numba's compiler, has swallowed it."""
+    if issubclass(found.exc_type, KeyboardInterrupt):
+        threading.Timer(_SOON, _press_again).start()
+    else:
+        sys.__unraisablehook__(found)
+
+
+def _press_again() -> None:
+    if hasattr(signal, "pthread_kill"):
+        # To the thread that is to be woken.
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        signal.raise_signal(signal.SIGINT)

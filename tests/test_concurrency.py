@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -156,8 +157,10 @@ class TestThreads:
             for number, found in zip(range(2, 18), pool.map(work, range(2, 18)), strict=True):
                 assert found == alone[number % 2]
 
-    def test_that_plan_get_the_ways_of_their_seeds(self) -> None:
+    def test_that_plan_get_the_ways_of_their_seeds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         skip_without("planning")
+        from env2mjcf.planning import bridge
+
         scene = env2mjcf.load(ALPHA)
         q = scene.space.sample(60, seed=0)
         q = q[scene.is_valid(q)]
@@ -167,6 +170,17 @@ class TestThreads:
 
         alone = [way(seed) for seed in range(4)]
         assert len(set(alone)) > 1
+
+        def slowly(seed: int) -> None:
+            # The seed is the process's: whoever may set another one meanwhile does so.
+            util.RNG.setSeed(seed)
+            time.sleep(0.05)
+
+        util = bridge.util
+        slow = SimpleNamespace(
+            setLogLevel=util.setLogLevel, LOG_NONE=util.LOG_NONE, RNG=SimpleNamespace(setSeed=slowly)
+        )
+        monkeypatch.setattr(bridge, "util", slow)
         with ThreadPoolExecutor(4) as pool:
             assert list(pool.map(way, range(4))) == alone
 
