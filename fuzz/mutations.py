@@ -67,10 +67,11 @@ def _change(pieces: list[bytes], other: bytes, random_: random.Random) -> None:
 
 
 def seeds(patterns: Iterable[str], folders: Iterable[Path]) -> list[bytes]:
-    """Return the files of some folders that are small enough to change in many places, small ones first."""
+    """Return small files of our own making, and those of folders that are small enough to be changed in many places."""
     files = {path for folder in folders for pattern in patterns for path in folder.rglob(pattern) if path.is_file()}
     found = sorted((path.read_bytes() for path in files), key=len)
-    return [data for data in found if len(data) < 60_000] or found[:1] or [*_MADE.get("".join(patterns), [b"1 2 3\n"])]
+    made = [data for pattern in patterns for data in _MADE.get(pattern, [])]
+    return [*made, *(data for data in found if len(data) < 60_000)] or found[:1] or [b"1 2 3\n"]
 
 
 def _array(values: object) -> bytes:

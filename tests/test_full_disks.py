@@ -182,14 +182,17 @@ def test_a_place_where_no_file_can_be_is_said(verb: str, inputs: Path) -> None:
 
 
 @of_verbs("plan", "batch")
-def test_a_device_is_not_replaced_by_a_file(verb: str, inputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(VERBS, verb, (VERBS[verb][0], "null", VERBS[verb][2]))
-    judged(run(verb, inputs, Path("/dev")), verb, "is no regular file")
-    with pytest.raises(OSError, match="no regular file"), replaced("/dev/full") as beside:
+def test_what_is_no_file_is_not_replaced_by_one(
+    verb: str, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pipe stands for devices such as /dev/null, which renaming would replace just so."""
+    monkeypatch.setitem(VERBS, verb, (VERBS[verb][0], "pipe", VERBS[verb][2]))
+    os.mkfifo(tmp_path / "pipe")
+    judged(run(verb, inputs, tmp_path), verb, "is no regular file")
+    with pytest.raises(OSError, match="no regular file"), replaced(tmp_path / "pipe") as beside:
         beside.write_text("")
-    assert Path("/dev/null").is_char_device()
-    assert Path("/dev/full").is_char_device()
-    assert not list(Path("/dev").glob(".*"))
+    assert (tmp_path / "pipe").is_fifo()
+    assert [p.name for p in tmp_path.iterdir()] == ["pipe"]
 
 
 @needs("planning")
