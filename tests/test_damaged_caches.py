@@ -170,11 +170,12 @@ def test_what_numba_keeps_is_compiled_anew_where_it_is_cut_short(damage: str, tm
     """Of a small function, because the engine's own take a minute."""
     pytest.importorskip("numba")
     (tmp_path / "entries.py").write_text(_COMPILED)
-    paths = os.pathsep.join([str(tmp_path), str(folders.ROOT)])
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(folders.ROOT)])}
+    environment.pop("NUMBA_CACHE_DIR", None)
 
     def run() -> str:
         done = subprocess.run(
-            [sys.executable, "-c", "import entries"], env={**os.environ, "PYTHONPATH": paths}, cwd=tmp_path,
+            [sys.executable, "-c", "import entries"], env=environment, cwd=tmp_path,
             capture_output=True, text=True, check=False,
         )  # fmt: skip
         return done.stdout + done.stderr
