@@ -7,7 +7,7 @@ from contextlib import suppress
 from enum import Enum
 
 
-class Lock(Enum):
+class LockOutcome(Enum):
     """What came of an attempt to lock something."""
 
     HELD = "held"
@@ -15,22 +15,22 @@ class Lock(Enum):
     NONE = "the system cannot lock it"
 
 
-def try_lock(handle: int) -> Lock:
+def try_lock(handle: int) -> LockOutcome:
     """Lock an open file or folder for whoever opened it, without waiting; closing it, or a death, unlocks it.
 
     Windows cannot lock folders, and some network file systems cannot lock anything.
     """
     if sys.platform == "win32":
-        return Lock.NONE
+        return LockOutcome.NONE
     import fcntl
 
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        return Lock.TAKEN
+        return LockOutcome.TAKEN
     except OSError:
-        return Lock.NONE
-    return Lock.HELD
+        return LockOutcome.NONE
+    return LockOutcome.HELD
 
 
 def unlock(handle: int) -> None:

@@ -16,7 +16,7 @@ from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .locking import Lock, try_lock, unlock
+from .locking import LockOutcome, try_lock, unlock
 from .writing import replaced
 
 # Nobody needs more than a moment; a process that is stopped in that moment is not waited for forever.
@@ -56,6 +56,7 @@ class Staged:
         self.path = folder / _staged_name(name)
         self.assets = tuple(folder / relative for relative in assets)
         self._made: set[str] = set()
+        self._retired: Path | None = None
         self._handle, self._begun = -1, False
         (folder / "assets").mkdir(parents=True, exist_ok=True)
         try:
@@ -82,26 +83,33 @@ class Staged:
         self._made.add(path.name)
 
     def commit(self) -> None:
-        """Give the scene its name, and remove the assets that only the scene of that name before it used."""
+        """Give the scene its name, and remove the assets that only the scene of that name before it used.
+
+        Raises:
+            FolderBusyError: Another process does not let anybody write.
+            OSError: It cannot be renamed; `discard` then removes what was written.
+        """
         with _alone(self.folder):
             self._close()
-            retired = self._retire()
+            self._retire()
             os.replace(self.path, self.final)
             # The scene is there: what cannot be tidied up is no reason to say that it is not.
             with suppress(OSError):
-                if retired is not None:
-                    _remove(self.folder, retired)
+                self._remove_retired()
 
-    def _retire(self) -> Path | None:
+    def _retire(self) -> None:
         """Keep the scene of this name that was there before under a staged name, if it has assets that go with it.
 
         Whoever comes after a process that is killed knows from it what to remove.
         """
         if _named(self.final) <= {asset.name for asset in self.assets}:
-            return None
-        retired = self.path.with_name(_staged_name(self.final.stem))
-        retired.write_bytes(self.final.read_bytes())
-        return retired
+            return
+        self._retired = self.path.with_name(_staged_name(self.final.stem))
+        self._retired.write_bytes(self.final.read_bytes())
+
+    def _remove_retired(self) -> None:
+        if self._retired is not None:
+            _remove(self.folder, self._retired)
 
     def discard(self) -> None:
         """Remove the staged MJCF and the assets that were written for it."""
@@ -110,6 +118,7 @@ class Staged:
             return
         with suppress(OSError, FolderBusyError), _alone(self.folder):
             _remove(self.folder, self.path, self._made)
+            self._remove_retired()
 
     def _close(self) -> None:
         handle, self._handle = self._handle, -1
@@ -126,7 +135,7 @@ def _alone(folder: Path) -> Generator[None]:
     handle = os.open(folder, os.O_RDONLY)
     try:
         deadline = time.monotonic() + PATIENCE
-        while try_lock(handle) is Lock.TAKEN:
+        while try_lock(handle) is LockOutcome.TAKEN:
             if time.monotonic() > deadline:
                 raise FolderBusyError(str(folder))
             time.sleep(_PAUSE)
@@ -151,7 +160,7 @@ def _remove_stale(folder: Path) -> None:
     for staged in _old(folder, _STAGED):
         handle = os.open(staged, os.O_RDONLY)
         try:
-            if try_lock(handle) is not Lock.TAKEN:
+            if try_lock(handle) is not LockOutcome.TAKEN:
                 _remove(folder, staged)
         finally:
             os.close(handle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import multiprocessing
 import os
@@ -105,6 +106,19 @@ def kill_at(number: int, folder: Path) -> Callable[[], int]:
     Returns:
         A function that tells how many such calls there were.
     """
+    return _at_call(number, folder, lambda: os.kill(os.getpid(), signal.SIGKILL))
+
+
+def fail_at(number: int, folder: Path) -> Callable[[], int]:
+    """Let that call fail, as on a full disk."""
+
+    def fail() -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    return _at_call(number, folder, fail)
+
+
+def _at_call(number: int, folder: Path, act: Callable[[], None]) -> Callable[[], int]:
     count = 0
 
     def hook(event: str, arguments: tuple[object, ...]) -> None:
@@ -115,7 +129,7 @@ def kill_at(number: int, folder: Path) -> Callable[[], int]:
             if isinstance(path, str | bytes | os.PathLike) and Path(os.fsdecode(path)).is_relative_to(folder):
                 count += 1
                 if count == number:
-                    os.kill(os.getpid(), signal.SIGKILL)
+                    act()
                 return
 
     sys.addaudithook(hook)

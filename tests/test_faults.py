@@ -1,4 +1,4 @@
-"""Faults of the machine: processes that are killed, that race, disks that are full, damage, Ctrl-C, missing extras."""
+"""Conversions that are killed, that fail, and that race: what is in the folder stays whole."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from killing import kill_randomly
 
 import env2mjcf
 
-needs_posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals, limits and locks")
-pytestmark = needs_posix
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX signals, limits and locks")
 
 
 @pytest.fixture
@@ -135,6 +134,42 @@ class TestKilled:
         tally = kill_randomly(scenes, references, out, kills=4, seed=0)
         assert tally.killed == tally.old + tally.new - tally.finished == 4
         assert tally.wrong == []
+
+
+class TestFailing:
+    def test_whatever_fails_the_old_scene_stays_or_the_new_one_is_there(
+        self, scenes: tuple[Path, Path], references: list[Content], out: Path, tmp_path: Path
+    ) -> None:
+        env2mjcf.convert(scenes[0], out)
+        clean = folders.files(out)
+        moments = counted(lambda: env2mjcf.convert(scenes[1], out), lambda: folders.fail_at(0, out), tmp_path / "count")
+        assert moments > 12
+        env2mjcf.convert(scenes[0], out)
+        refused = 0
+        for number in range(1, moments + 1):
+
+            def work(number: int = number) -> None:
+                folders.fail_at(number, out)
+                try:
+                    env2mjcf.convert(scenes[1], out)
+                except env2mjcf.ConversionError as error:
+                    assert "No space left on device" in error.diagnostic.message
+                    os._exit(3)
+
+            failed = folders.in_child(work)
+            found = folders.content(out / "scene.xml")
+            if failed:
+                assert failed == 3
+                assert (found, folders.files(out)) == (references[0], clean)
+                refused += 1
+            else:
+                # What could not be tidied up goes once it is an hour old.
+                assert found == references[1]
+                folders.age(out)
+                env2mjcf.convert(scenes[0], out)
+                assert folders.files(out) == clean
+            assert folders.foreign_untouched(out)
+        assert 3 < refused < moments
 
 
 class TestRaces:

@@ -16,7 +16,7 @@ import folders
 import numpy as np
 import pytest
 from extras import needs
-from scenes import free_cube, write_scene
+from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.companions import write_path, write_query
@@ -69,6 +69,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     way = np.array([[-3.0, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 1], [-2, 2, 1, 0, 0, 1]])
     write_path(scene, way, folder / "a.path")
     (folder / "a.query").write_text("0 -3 -3 0 0 0 0\n0 3 -2 0 0 0 0\n")
+    write_scene(folder / "other", free_cube("bar.g 4 0 0 0 0 0"), bar=box_mesh(0.1, 0.2, 2.0))
     np.save(folder / "q.npy", scene.space.sample(20_000, seed=0))
     for above in (folder, *folder.parents):
         if above.stat().st_uid == os.getuid() and above != Path("/"):
@@ -89,11 +90,15 @@ def full_disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
-def filled(disk: Path, name: str) -> dict[str, bytes]:
+def filled(disk: Path, name: str, inputs: Path) -> dict[str, bytes]:
     """Empty a disk, put an old output there, fill it, and return what it holds."""
     for path in sorted(disk.rglob("*"), reverse=True):
         path.rmdir() if path.is_dir() else path.unlink()
-    (disk / name).write_bytes(b"<mujoco/>" if name.endswith(".xml") else OLD)
+    if name.endswith(".xml"):
+        # A conversion of something else, whose assets go when it is replaced.
+        env2mjcf.convert(inputs / "other" / "scene.env", disk / name)
+    else:
+        (disk / name).write_bytes(OLD)
     with (disk / "filler").open("wb", buffering=0) as file, suppress(OSError):
         while file.write(bytes(1024)):
             pass
@@ -127,7 +132,7 @@ def judged(found: tuple[int, str, str, str], verb: str, reason: str) -> None:
 
 @some_verbs
 def test_a_full_disk_is_said_and_what_was_there_stays(verb: str, inputs: Path, full_disk: Path) -> None:
-    before = filled(full_disk, VERBS[verb][1])
+    before = filled(full_disk, VERBS[verb][1], inputs)
     judged(run(verb, inputs, full_disk), verb, "No space left on device")
     assert content(full_disk) == before
 
@@ -137,7 +142,7 @@ def test_wherever_the_disk_is_full_nothing_is_left(verb: str, inputs: Path, full
     """A little more room each time, until all fits."""
     outcomes: list[int] = []
     for pages in range(30):
-        before = filled(full_disk, VERBS[verb][1])
+        before = filled(full_disk, VERBS[verb][1], inputs)
         os.truncate(full_disk / "filler", len(before["filler"]) - 4096 * pages)
         before = content(full_disk)
         outcomes.append(run(verb, inputs, full_disk)[0])
@@ -219,14 +224,14 @@ def test_every_writer_says_that_the_disk_is_full(inputs: Path, full_disk: Path) 
     for name, write in writers.items():
         if name == "a.png" and not GL:
             continue
-        before = filled(full_disk, name)
+        before = filled(full_disk, name, inputs)
         with pytest.raises(env2mjcf.ConversionError, match="No space left on device"):
             write(full_disk / name)
         assert content(full_disk) == before
 
 
 def test_a_cache_on_a_full_disk_stops_nothing(inputs: Path, full_disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = filled(full_disk, "old")
+    before = filled(full_disk, "old", inputs)
     log = DiagnosticLog()
     value = GeometryCache(full_disk).remember(("a",), lambda: (1.0, 2.0), kinds=(), known={}, log=log)
     assert value == (1.0, 2.0)

@@ -19,7 +19,7 @@ from numpy.lib.format import open_memmap, write_array_header_1_0
 from numpy.typing import NDArray
 
 from ..errors import ConversionError, DiagnosticLog
-from ..locking import Lock, try_lock
+from ..locking import LockOutcome, try_lock
 
 _FORMAT = 1
 _ZEROS = bytes(1 << 20)
@@ -60,7 +60,7 @@ class Partial:
             self._handle = os.open(self._partial, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             self._fail(error)
-        if try_lock(self._handle) is Lock.TAKEN or not self._is_ours():
+        if try_lock(self._handle) is LockOutcome.TAKEN or not self._is_ours():
             os.close(self._handle)
             message = f"another process is writing {self._partial}"
             DiagnosticLog().fail(ConversionError, "CFG509", str(output), message, hint="wait, or choose another output")
