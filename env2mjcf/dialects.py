@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from .model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
+from .model import BoundaryShape, DHForm, Dialect, Environment, JointType, MultiBodyKind, Recentring
 
 
 class JointOrder(StrEnum):
@@ -92,6 +92,14 @@ RULES: dict[Dialect, DialectRules] = {
 }
 
 
+class SurfaceLabels(StrEnum):
+    """Whether the original reader takes a label after `Surface` (env-format section 7)."""
+
+    NONE = "none"
+    OPTIONAL = "optional"
+    REQUIRED = "required"
+
+
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
     """What the original reader of a dialect takes, beyond meshes, poses and connections.
@@ -101,34 +109,36 @@ class Vocabulary:
         brackets: Whether the boundary stands in brackets.
         resolution: Fields of `Resolution`.
         kinds: Multibodies of an environment file; robots of dialect E have files of their own.
-        bases: How bodies are carried.
         joints: Types of joints.
         limits: Whether joints have limits.
         options: Whether bodies have options: recentring, colour, texture.
         mass: Whether a robot's bodies have masses.
         adjacencies: Whether robots have `Adjacencies`.
+        surface_labels: Whether surfaces have labels.
         robot_files: Whether each robot has a file of its own.
-        legacy_bodies: Whether obstacles may have many bodies, and a free base has a pose.
+        query_index: Whether each configuration of a query or path begins with the index of its robot.
+        legacy_layout: Whether multibodies are laid out as in dialect A: obstacles may have many bodies, a free base has
+            a pose, and connections have their joints in another line.
     """
 
     boundaries: frozenset[BoundaryShape]
     brackets: bool
     resolution: tuple[str, ...]
     kinds: frozenset[MultiBodyKind]
-    bases: frozenset[BaseKind]
     joints: frozenset[JointType]
     limits: bool
     options: bool
     mass: bool
     adjacencies: bool
+    surface_labels: SurfaceLabels = SurfaceLabels.NONE
     robot_files: bool = False
-    legacy_bodies: bool = False
+    query_index: bool = True
+    legacy_layout: bool = False
 
 
 _LATER_JOINTS = frozenset({JointType.REVOLUTE, JointType.SPHERICAL, JointType.NON_ACTUATED})
 _OBSTACLES = frozenset({MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL})
 _LATER_KINDS = _OBSTACLES | {MultiBodyKind.ACTIVE, MultiBodyKind.SURFACE}
-_ALL_BASES = frozenset(BaseKind)
 
 VOCABULARIES: dict[Dialect, Vocabulary] = {
     Dialect.A: Vocabulary(
@@ -136,20 +146,19 @@ VOCABULARIES: dict[Dialect, Vocabulary] = {
         brackets=False,
         resolution=(),
         kinds=_OBSTACLES | {MultiBodyKind.ACTIVE},
-        bases=frozenset({BaseKind.VOLUMETRIC_ROTATIONAL, BaseKind.FIXED, BaseKind.JOINT}),
         joints=frozenset({JointType.REVOLUTE, JointType.PRISMATIC}),
         limits=False,
         options=False,
         mass=False,
         adjacencies=False,
-        legacy_bodies=True,
+        query_index=False,
+        legacy_layout=True,
     ),
     Dialect.B: Vocabulary(
         boundaries=frozenset(),
         brackets=False,
         resolution=(),
         kinds=_LATER_KINDS,
-        bases=_ALL_BASES,
         joints=_LATER_JOINTS,
         limits=False,
         options=False,
@@ -161,36 +170,45 @@ VOCABULARIES: dict[Dialect, Vocabulary] = {
         brackets=False,
         resolution=(),
         kinds=frozenset(MultiBodyKind),
-        bases=_ALL_BASES,
         joints=_LATER_JOINTS | {JointType.SMA},
         limits=True,
         options=False,
         mass=False,
         adjacencies=False,
+        surface_labels=SurfaceLabels.OPTIONAL,
     ),
     Dialect.D: Vocabulary(
         boundaries=frozenset(BoundaryShape),
         brackets=True,
         resolution=("position", "position_factor", "orientation", "time", "rd"),
         kinds=frozenset(MultiBodyKind),
-        bases=_ALL_BASES,
         joints=_LATER_JOINTS | {JointType.SMA},
         limits=True,
         options=True,
         mass=True,
         adjacencies=True,
+        surface_labels=SurfaceLabels.REQUIRED,
     ),
     Dialect.E: Vocabulary(
         boundaries=frozenset(BoundaryShape),
         brackets=True,
         resolution=("position", "orientation", "time"),
         kinds=_OBSTACLES,
-        bases=_ALL_BASES,
         joints=_LATER_JOINTS,
         limits=True,
         options=True,
         mass=False,
         adjacencies=True,
         robot_files=True,
+        query_index=False,
     ),
 }
+
+
+def begins_with_robot(environment: Environment) -> bool:
+    """Say whether configurations in files begin with the index of their robot.
+
+    They do in some dialects (env-format section 9.6), and where there are several robots, which nothing else would tell
+    apart.
+    """
+    return VOCABULARIES[environment.dialect].query_index or len(environment.robots) > 1

@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import ConversionError, DiagnosticLog
+from .options import PathArgument
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -62,3 +63,32 @@ def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
             ConversionError, code, path, f"{path} cannot be written: {error.strerror or error}",
             hint=f"{'make room, or ' if full else ''}choose another file; its folder must exist",
         )  # fmt: skip
+
+
+def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgument] = ()) -> None:
+    """Refuse a file that cannot be written, before time is spent on its content.
+
+    Args:
+        out: The file to write.
+        code: The code of the diagnostic.
+        inputs: Files that are read for it, those that are not there, too.
+
+    Raises:
+        ConversionError: It is a folder, one of the inputs, or lies in no folder, or in one that may not be written.
+    """
+    path = Path(os.fsdecode(out))
+    if path.is_dir():
+        what = "is a folder"
+    elif path.exists() and any(os.path.exists(i) and os.path.samefile(path, i) for i in inputs):
+        what = "is an input"
+    elif path.exists() and not path.is_file():
+        what = "is no regular file"
+    elif not path.parent.is_dir():
+        what = f"lies in {path.parent}, which is no folder"
+    elif not os.access(path.parent, os.W_OK):
+        what = f"lies in {path.parent}, which may not be written"
+    else:
+        return
+    DiagnosticLog().fail(
+        ConversionError, code, str(path), f"{path} {what}; expected a file to write", hint="name another output"
+    )

@@ -23,7 +23,6 @@ def main() -> int:
     """Interrupt, and say what was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=20)
-    parser.add_argument("--seconds", type=float, default=4.0, help="the last moment of an interruption")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("verbs", nargs="*", default=list(interrupting.VERBS))
     arguments = parser.parse_args()
@@ -32,7 +31,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary).resolve()
             interrupting.prepare(folder)
-            tally = interrupting.interrupt_randomly(verb, folder, arguments.count, arguments.seconds, arguments.seed)
+            tally = interrupting.interrupt_randomly(verb, folder, arguments.count, arguments.seed)
         print(
             f"interrupts: {verb}: {arguments.count} signals, {tally.interrupted} interrupted, "
             f"{tally.finished} done before, {len(tally.wrong)} wrong",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.companions import write_path
 
-# What each verb writes, and how it is asked to; `view` goes on until it is interrupted.
+# How each verb is asked to write into a folder.
 VERBS = {
     "convert": "scene.env made",
     "batch": "scene.env q.npy -o made/v.npy --what clearance --threads 2 --engine mujoco",
@@ -31,7 +32,12 @@ VERBS = {
     "info": "scene.env",
     "lint": "scene.env",
     "view": "scene.env --no-browser",
+    "cache": "warm",
 }
+# `view` goes on until it is interrupted; what `cache` has compiled when it is, the next run finds.
+_SECONDS = {"view": 4.0, "cache": 30.0}
+# What a batch goes on from.
+_RESUMABLE = (".partial", ".journal")
 
 
 @dataclass(slots=True)
@@ -39,7 +45,7 @@ class Tally:
     """What came of interruptions.
 
     Attributes:
-        interrupted: Processes that ended with status 130, or at once by the signal.
+        interrupted: Processes that ended with status 130, or by the signal.
         finished: Processes that were done before.
         wrong: What should not have been.
     """
@@ -58,19 +64,26 @@ def prepare(folder: Path) -> None:
     (folder / "made").mkdir()
 
 
-def interrupt(verb: str, folder: Path, after: float, tally: Tally) -> None:
+def uninterrupted(verb: str, folder: Path) -> tuple[dict[str, bytes], float]:
+    """Run a verb; return the files that it makes, and the seconds that it takes."""
+    began = time.monotonic()
+    assert _start(verb, folder).wait() in (0, 1)
+    return _made(folder), time.monotonic() - began
+
+
+def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], tally: Tally) -> None:
     """Run a verb, interrupt it after some seconds, and look at what it says and leaves.
 
     The signal goes to the process alone, so that what it started is its own to stop.
+
+    Args:
+        verb: One of `VERBS`.
+        folder: What `prepare` has prepared.
+        after: The seconds.
+        whole: The files that it makes.
+        tally: What is added to.
     """
-    command = [sys.executable, "-m", "env2mjcf", verb.partition(" ")[0], *VERBS[verb].split()]
-    for path in (folder / "made").rglob("*"):
-        if path.is_file():
-            path.unlink()
-    child = subprocess.Popen(
-        command, cwd=folder, env=folders.ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-        text=True, start_new_session=True, preexec_fn=heed,  # noqa: PLW1509
-    )  # fmt: skip
+    child = _start(verb, folder)
     try:
         time.sleep(after)
         child.send_signal(signal.SIGINT)
@@ -87,7 +100,7 @@ def interrupt(verb: str, folder: Path, after: float, tally: Tally) -> None:
     what = f"{verb} after {after:.3f} s: status {child.returncode}"
     if child.returncode in (130, -signal.SIGINT):
         tally.interrupted += 1
-    elif child.returncode in ((0, 1, 130) if verb != "view" else (0,)):
+    elif child.returncode in (0, 1):
         tally.finished += 1
     else:
         tally.wrong.append(f"{what}: {said[-300:]}")
@@ -96,17 +109,36 @@ def interrupt(verb: str, folder: Path, after: float, tally: Tally) -> None:
         tally.wrong.append(f"{what}: {said[-600:]}")
     if left:
         tally.wrong.append(f"{what}: left {len(left)} processes")
-    names = {p.name for p in (folder / "made").rglob("*") if p.is_file() and p.name.startswith(".")}
-    if names:
-        tally.wrong.append(f"{what}: left {sorted(names)}")
+    made = {name: data for name, data in _made(folder).items() if verb != "batch" or not name.endswith(_RESUMABLE)}
+    if not made.items() <= whole.items():
+        tally.wrong.append(f"{what}: left {sorted(name for name in made if made[name] != whole.get(name))}")
+    if child.returncode == 0 and made != whole:
+        tally.wrong.append(f"{what}: did not write {sorted(whole.keys() - made.keys())}")
 
 
-def interrupt_randomly(verb: str, folder: Path, count: int, longest: float, seed: int) -> Tally:
-    """Interrupt a verb at some moments of its first seconds."""
+def interrupt_randomly(verb: str, folder: Path, count: int, seed: int) -> Tally:
+    """Interrupt a verb at some moments of its life."""
     chance, tally = random.Random(f"{seed} {verb}"), Tally()
+    whole, life = ({}, _SECONDS[verb]) if verb in _SECONDS else uninterrupted(verb, folder)
     for _ in range(count):
-        interrupt(verb, folder, chance.uniform(0.05, longest), tally)
+        interrupt(verb, folder, chance.uniform(0.05, life), whole, tally)
     return tally
+
+
+def _start(verb: str, folder: Path) -> subprocess.Popen[str]:
+    shutil.rmtree(folder / "made", ignore_errors=True)
+    (folder / "made").mkdir()
+    command = [sys.executable, "-m", "env2mjcf", verb.partition(" ")[0], *VERBS[verb].split()]
+    compiled = {"NUMBA_CACHE_DIR": str(folder / "compiled")} if verb == "cache" else {}
+    return subprocess.Popen(
+        command, cwd=folder, env={**folders.ENVIRONMENT, **compiled}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        text=True, start_new_session=True, preexec_fn=heed,  # noqa: PLW1509
+    )  # fmt: skip
+
+
+def _made(folder: Path) -> dict[str, bytes]:
+    made = folder / "made"
+    return {p.relative_to(made).as_posix(): p.read_bytes() for p in made.rglob("*") if p.is_file()}
 
 
 def heed() -> None:

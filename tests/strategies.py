@@ -80,6 +80,9 @@ def _environments(draw: Any, dialect: Dialect, rich: bool) -> Environment:
 @st.composite
 def _resolutions(draw: Any, fields: tuple[str, ...]) -> Resolution:
     steps = {name: draw(st.none() | st.floats(1e-3, 1)) for name in fields}
+    if "position_factor" in steps:
+        # The one that may be nothing.
+        steps["position_factor"] = draw(st.none() | st.just(0.0) | st.floats(-1, 1))
     if steps.get("orientation") is not None:
         steps["orientation"] *= math.pi
     return Resolution(**steps)
@@ -119,7 +122,7 @@ def _obstacles(draw: Any, dialect: Dialect, rich: bool) -> MultiBody:
     kinds = VOCABULARIES[dialect].kinds if rich else {MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL}
     kind = draw(st.sampled_from(sorted(kinds - {MultiBodyKind.ACTIVE, MultiBodyKind.NON_HOLONOMIC})))
     bodies = [draw(_dressed(dialect, BaseKind.FIXED, draw(POSES), 0))]
-    if rich and VOCABULARIES[dialect].legacy_bodies:
+    if rich and VOCABULARIES[dialect].legacy_layout:
         bodies += [draw(_dressed(dialect, BaseKind.FIXED, draw(POSES), 1 + i)) for i in range(draw(st.integers(0, 2)))]
     labelled = kind is MultiBodyKind.SURFACE and dialect is not Dialect.B
     label = draw(st.sampled_from([None, "floor"])) if labelled else None

@@ -18,9 +18,9 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 @pytest.mark.parametrize("verb", ["convert", "batch", "play", "plan"])
 def test_a_verb_that_is_interrupted_leaves_nothing(verb: str, tmp_path: Path) -> None:
     interrupting.prepare(tmp_path)
-    tally = interrupting.interrupt_randomly(verb, tmp_path, count=2, longest=2.5, seed=0)
+    tally = interrupting.interrupt_randomly(verb, tmp_path, count=2, seed=0)
     assert tally.wrong == []
-    assert tally.interrupted + tally.finished == 2
+    assert tally.interrupted > 0
 
 
 # Numpy makes another error of Ctrl-C, and Python a traceback.

@@ -416,9 +416,11 @@ def test_the_program_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
 
 def test_the_program_replaces_no_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path, LEGACY, "scene.env")
-    assert main(["translate", str(path), "-o", str(path), "--dialect", "D"]) == 2
+    assert main(["translate", str(path), "-o", str(path), "--dialect", "D"]) == 3
     assert path.read_text() == LEGACY
-    assert "would be replaced" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "error ENV179: " in err
+    assert "scene.env is an input; expected a file to write" in err
 
 
 def test_the_program_says_what_is_refused_and_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

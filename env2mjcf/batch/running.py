@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.batch import thread_count
-from ..errors import ConversionError, DiagnosticLog
 from ..options import PathArgument
 from ..simulation.scene import Scene
+from ..writing import refuse_unwritable
 from .identity import identity
 from .journal import Partial, Progress
 from .source import Source, open_source
@@ -99,7 +99,7 @@ def run(
         raise ValueError(f"what={what!r} is not one of {', '.join(map(repr, WHAT))}")
     source = open_source(str(configurations), scene.space, file_units)
     target = Path(output)
-    _refuse(target, Path(configurations))
+    refuse_unwritable(target, "CFG509", [configurations])
     count = None if executor is not None and threads is None else thread_count(threads, len(source))
     partial = Partial(target)
     try:
@@ -190,18 +190,6 @@ class _Work:
 
     def _commit(self) -> None:
         self._partial.commit(Progress(self._job, len(self._source), self._done, self._digest.hexdigest()))
-
-
-def _refuse(output: Path, source: Path) -> None:
-    log, path = DiagnosticLog(), str(output)
-    exists = output.exists()
-    if (exists and not output.is_file()) or not output.parent.is_dir():
-        what = "is no regular file" if exists else f"lies in {output.parent}, which is no folder"
-        log.fail(
-            ConversionError, "CFG509", path, f"{path} {what}; expected a file to write", hint="name another output"
-        )
-    if exists and output.samefile(source):
-        log.fail(ConversionError, "CFG509", path, f"{path} is the input, too", hint="name another output")
 
 
 def _summary(answers: NDArray[Any], what: What) -> tuple[dict[str, int], float | None]:

@@ -15,6 +15,7 @@ from tyro.conf import Positional
 
 from ..errors import ConversionError, DiagnosticLog
 from ..options import Options
+from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .judgements import (
     Listed,
@@ -26,7 +27,6 @@ from .judgements import (
     pose_summary,
     verdict_lines,
 )
-from .outputs import refuse_unwritable
 from .printing import print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:

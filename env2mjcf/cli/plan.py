@@ -15,9 +15,10 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
+from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .configurations import refuse_without_freedom
-from .outputs import refuse_foreign_path, refuse_unwritable
+from .outputs import refuse_foreign_path
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import Options
+from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .cameras import camera_of, size_of
-from .outputs import refuse_unwritable
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..dialects import begins_with_robot
 from ..errors import DiagnosticLog, FormatError, Span
 from ..formats.path import ALL_ROBOTS
 from ..formats.rows import LARGEST
@@ -93,13 +94,8 @@ def columns_of(scene: Scene, robot: int) -> slice:
 
 
 def written_index(scene: Scene, robot: int) -> int | None:
-    """Return the index that a robot's configurations begin with; None where the dialect writes none.
-
-    Dialects B to D write one, A and E none (env-format section 9.6); where there are several robots, nothing else
-    would tell them apart.
-    """
-    plain = scene.environment.dialect in (Dialect.A, Dialect.E) and len(scene.space.robot_slices) == 1
-    return None if plain else robot
+    """Return the index that a robot's configurations begin with; None where the dialect writes none."""
+    return robot if begins_with_robot(scene.environment) else None
 
 
 def write(file: PathArgument, text: str) -> Path:

@@ -21,7 +21,7 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
         losses: Where losses are reported.
     """
     dressed = _dressed(body, losses)
-    if not losses.vocabulary.legacy_bodies:
+    if not losses.vocabulary.legacy_layout:
         _report_home(body, base, losses)
         return replace(dressed, base=base, index=None, pose=(body.pose or Pose()) if base is BaseKind.FIXED else None)
     # Dialect A's first FreeBody is a free base, every other one a link (env-format section 4).
@@ -38,7 +38,7 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
 def static_body(body: Body, pose: Pose, losses: Losses) -> Body:
     """Return the body of an obstacle or a surface."""
     dressed = _dressed(body, losses)
-    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.vocabulary.legacy_bodies else None)
+    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.vocabulary.legacy_layout else None)
 
 
 def _dressed(body: Body, losses: Losses) -> Body:

@@ -42,7 +42,8 @@ def boundary(environment: Environment, losses: Losses) -> Boundary | None:
 def resolution(environment: Environment, losses: Losses) -> Resolution:
     """Return the step sizes that the dialect can express."""
     found, kept = environment.resolution, losses.vocabulary.resolution
-    given = [name for name in ("position", "position_factor", "orientation", "time", "rd") if getattr(found, name)]
+    names = ("position", "position_factor", "orientation", "time", "rd")
+    given = [name for name in names if getattr(found, name) is not None]
     lost = [name for name in given if name not in kept]
     if lost:
         listed = ", ".join(lost)

@@ -28,7 +28,7 @@ def _connection(connection: Connection, robot: MultiBody, losses: Losses) -> Con
         found,
         dh=DHParameters(settled(dh.alpha, unit), dh.a, dh.d, settled(dh.theta, unit), dh.span),
         limits=_limits(found, losses),
-        actuated=connection.actuated if same else "Actuated" if losses.vocabulary.legacy_bodies else None,
+        actuated=connection.actuated if same else "Actuated" if losses.vocabulary.legacy_layout else None,
     )
 
 

@@ -8,12 +8,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from ..dialects import begins_with_robot
 from ..errors import ConversionError, Diagnostic, DiagnosticLog
 from ..formats.query import query_text
 from ..formats.writers import env_text, robot_text
-from ..model import Dialect, Environment
+from ..model import Environment
 from ..options import PathArgument
-from ..writing import output
+from ..writing import output, refuse_unwritable
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +50,19 @@ def write_environment(
         inputs: Files that must not be replaced.
 
     Raises:
-        ConversionError: A file cannot be written, or a mesh cannot be named from there.
-        ValueError: One of the files is an input.
+        ConversionError: A file cannot be written, or is an input; or a mesh cannot be named from there.
     """
     log = DiagnosticLog()
     out = Path(os.fspath(file))
     robots = [m for m in environment.multibodies if m.robot_file is not None]
     names = _robot_files(out, len(robots))
     query = out.with_suffix(".query") if environment.tasks else None
-    _refuse_inputs([out, *names, *([query] if query else [])], [environment.path, *inputs])
+    for path in (out, *names, *([query] if query else [])):
+        refuse_unwritable(path, "ENV179", [name for name in (environment.path, *inputs) if name])
     placed, outside = _relocated(environment, out.parent, [environment.directory, *map(Path, mesh_dirs)], log)
     texts = {n: robot_text(m) for n, m in zip(names, (m for m in placed.multibodies if m.robot_file), strict=True)}
     if query is not None:
-        # Dialects B to D begin each configuration with its robot; so must any with several robots.
-        plain = environment.dialect in (Dialect.A, Dialect.E) and len(environment.robots) == 1
-        texts[query] = query_text(environment.tasks, index=not plain)
+        texts[query] = query_text(environment.tasks, index=begins_with_robot(environment))
     with ExitStack() as written:
         # All are written before any is renamed, the env file last, as the first that was entered.
         for path, text in {out: env_text(placed), **texts}.items():
@@ -76,13 +75,6 @@ def _robot_files(out: Path, count: int) -> list[Path]:
     if count == 1:
         return [out.with_suffix(".robot")]
     return [out.with_name(f"{out.stem}-{i}.robot") for i in range(count)]
-
-
-def _refuse_inputs(outputs: Sequence[Path], inputs: Sequence[str]) -> None:
-    taken = {os.path.realpath(name): name for name in inputs if name}
-    for path in outputs:
-        if os.path.realpath(path) in taken:
-            raise ValueError(f"{path} would be replaced, and is what is read; choose another output")
 
 
 def _relocated(

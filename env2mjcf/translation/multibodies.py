@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ..dialects import RULES
+from ..dialects import RULES, SurfaceLabels
 from ..dofs import build_tree
 from ..errors import DiagnosticLog
 from ..kinematics import RobotKinematics
@@ -58,7 +58,7 @@ def robot(source: MultiBody, meets_obstacles: bool, losses: Losses) -> MultiBody
 
 def obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody]:
     """Yield an obstacle or a surface; dialects B to E have one multibody for each body."""
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_bodies:
+    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
         yield replace(source, connections=connections(source, losses), dh_form=losses.rules.dh_form)
         return
     kinematics = RobotKinematics.of(source)
@@ -77,11 +77,11 @@ def obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody]:
 
 
 def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_bodies:
+    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
         return source.bodies
     bases = build_tree(source, DiagnosticLog()).bases
     bodies = [robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
-    if losses.vocabulary.legacy_bodies:
+    if losses.vocabulary.legacy_layout:
         fixed = [b.base is BaseKind.FIXED for b in bodies]
         bodies = [replace(b, index=fixed[:i].count(fixed[i])) for i, b in enumerate(bodies)]
     return tuple(bodies)
@@ -90,10 +90,10 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
 def _label(source: MultiBody, losses: Losses) -> str | None:
     if source.kind is not MultiBodyKind.SURFACE:
         return None
-    if losses.vocabulary.options and source.dialect is not losses.dialect:
-        # Dialect D's planner insists on a label (env-format section 7).
+    labels = losses.vocabulary.surface_labels
+    if labels is SurfaceLabels.REQUIRED and source.dialect is not losses.dialect:
         return source.label or "surface"
-    if losses.vocabulary.limits:
+    if labels is not SurfaceLabels.NONE:
         return source.label
     if source.label is not None:
         losses.lost("ENV170", source.label, f"dialect {losses.dialect} has no labels of surfaces", "", source.span)

@@ -115,7 +115,7 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
             found += _surface(source, losses)
     if losses.vocabulary.robot_files:
         found.sort(key=lambda m: m.robot_file is not None)
-    elif losses.vocabulary.legacy_bodies and environment.dialect is not losses.dialect:
+    elif losses.vocabulary.legacy_layout and environment.dialect is not losses.dialect:
         # Its planner moves multibody 0, whatever the tag says (env-format section 4.2).
         found.sort(key=lambda m: not m.moves)
     return tuple(found)
@@ -123,7 +123,7 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
 
 def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
     name, dialect = source.label or source.bodies[0].filename, losses.dialect
-    if not losses.vocabulary.legacy_bodies:
+    if not losses.vocabulary.legacy_layout:
         losses.lost(
             "ENV174", name, f"dialect {dialect} has no surfaces; {name}, which only is drawn, is lost", "", source.span
         )
@@ -136,7 +136,7 @@ def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
 
 
 def _report_number(environment: Environment, losses: Losses) -> None:
-    if not losses.vocabulary.legacy_bodies or environment.dialect is losses.dialect:
+    if not losses.vocabulary.legacy_layout or environment.dialect is losses.dialect:
         return
     robots = environment.robots
     if not robots and environment.multibodies:

@@ -15,12 +15,13 @@ _WHOLE_TURNS = {JointType.REVOLUTE: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}
 
 def connection_lines(connections: Sequence[Connection], dialect: Dialect, rules: DialectRules) -> Iterator[str]:
     """Yield the tag, the count and each connection."""
-    yield "Connection" if dialect is Dialect.A else "Connections"
+    legacy = VOCABULARIES[dialect].legacy_layout
+    yield "Connection" if legacy else "Connections"
     yield str(len(connections))
     for connection in connections:
         fields = {name: _field(connection, name, dialect, rules) for name in rules.connection_fields}
         head = [str(connection.previous), str(connection.next)]
-        if dialect is Dialect.A:
+        if legacy:
             yield " ".join([*head, fields.pop("actuated")])
         else:
             yield " ".join([*head, fields.pop("joint"), fields.pop("limits")]).rstrip()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from ...dialects import RULES, VOCABULARIES
+from ...dialects import RULES, VOCABULARIES, SurfaceLabels
 from ...model import Boundary, Comment, Dialect, Environment, MultiBody, MultiBodyKind, Resolution
 from ..blocks import Grammar
 from .bodies import legacy_bodies, robot_body, static_body
@@ -32,14 +32,13 @@ def env_text(environment: Environment) -> str:
     """
     dialect = environment.dialect
     inside = [m for m in environment.multibodies if m.robot_file is None]
-    if dialect is Dialect.A:
-        lines = [*_legacy_comments(environment)]
-    else:
-        lines = [*_comments(environment.comments), *_preamble(environment)]
+    legacy = VOCABULARIES[dialect].legacy_layout
+    comments = _legacy_comments(environment) if legacy else _comments(environment.comments)
+    lines = [*comments, *_preamble(environment)]
     lines.append(str(len(inside)))
     for multibody in inside:
         lines.append("")
-        lines += _legacy(multibody, environment.semantics) if dialect is Dialect.A else _later(multibody, dialect)
+        lines += _legacy(multibody, environment.semantics) if legacy else _later(multibody, dialect)
     return _joined(lines)
 
 
@@ -109,7 +108,7 @@ def _legacy(multibody: MultiBody, semantics: str) -> Iterator[str]:
 
 def _later(multibody: MultiBody, dialect: Dialect) -> Iterator[str]:
     if multibody.kind is MultiBodyKind.SURFACE:
-        labelled = multibody.label is not None and dialect is not Dialect.B
+        labelled = multibody.label is not None and VOCABULARIES[dialect].surface_labels is not SurfaceLabels.NONE
         yield f"Surface {multibody.label}" if labelled else "Surface"
         yield from static_body(multibody.bodies[0], dialect, VOCABULARIES[dialect])
         return
