@@ -152,6 +152,7 @@ CATALOGUE: dict[str, str] = {
     "GEO244": "Flat parts of a closed mesh were folded over themselves; they were triangulated anew.",
     "GEO250": "The inertia of a body was not computed from its volume alone.",
     "GEO251": "A scene is so large or small that its unit is hardly the metre.",
+    "GEO252": "A body lies too far from the origin to be computed with.",
     "GEO260": "An entry of the geometry cache was damaged and has been made anew.",
     "GEO261": "The geometry cache cannot be read or written; everything is computed.",
     "GEO262": "CoACD crashed, hung, or gave no parts.",
@@ -174,6 +175,7 @@ CATALOGUE: dict[str, str] = {
     "KIN320": "An SMAJoint cannot be converted.",
     # What is written for MuJoCo.
     "MJC401": "MuJoCo refuses a model.",
+    "MJC402": "MuJoCo warns of a model, and Python is told that warnings are errors.",
     "MJC410": "A loop that closes by a slide stays open in the simulation.",
     "MJC411": "A free base gets no actuator.",
     "MJC412": "An attribute of the environment concerns the planner, and is not written.",

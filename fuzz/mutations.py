@@ -69,7 +69,7 @@ def _change(pieces: list[bytes], other: bytes, random_: random.Random) -> None:
 def seeds(patterns: Iterable[str], folders: Iterable[Path]) -> list[bytes]:
     """Return small files of our own making, and those of folders that are small enough to be changed in many places."""
     files = {path for folder in folders for pattern in patterns for path in folder.rglob(pattern) if path.is_file()}
-    found = sorted((path.read_bytes() for path in files), key=len)
+    found = sorted((path.read_bytes() for path in files), key=lambda data: (len(data), data))
     made = [data for pattern in patterns for data in _MADE.get(pattern, [])]
     return [*made, *(data for data in found if len(data) < 60_000)] or found[:1] or [b"1 2 3\n"]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
+import re
+import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -30,11 +33,15 @@ _CUBE = (MODELS / "seed" / "cube.g").read_text()
 _CARRIER = (
     "Boundary Box [-9:9 ; -9:9 ; -9:9]\nMultibodies\n1\nActive\n1\ncube.g Volumetric Rotational\nConnections\n0\n"
 )
+_MESH_NAME = re.compile(rb"(?<![\w./-])(?:[\w-]{1,30}/)?[\w-]{1,30}\.(?:g|obj|dat)\b", re.ASCII)
+_MOST_NAMES = 1000
+_given: set[bytes] = set()
 
 
 @functools.cache
 def _folder() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="env2mjcf-fuzz-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     (folder / "host.env").write_text(_HOST)
     (folder / "cube.g").write_text(_CUBE)
     (folder / "carrier.env").write_text(_CARRIER)
@@ -103,23 +110,33 @@ def _mesh(data: bytes) -> None:
 
 
 def _scene(data: bytes) -> None:
-    """Take an environment the whole way to MuJoCo; every mesh that it names in this folder is a cube."""
+    """Take an environment the whole way to MuJoCo; every mesh that it names is a cube."""
+    for name in {*_MESH_NAME.findall(data)} - _given:
+        # Names of the files to start from, and some that have come of them.
+        if len(_given) < _MOST_NAMES:
+            _given.add(name)
+            path = _folder() / name.decode()
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(_CUBE)
     env2mjcf.load(_written(data, "whole.env"), engine="mujoco", cache=False, limits=LIMITS)
 
 
-def _only_ours(read: Callable[[bytes], None]) -> Callable[[bytes], None]:
+def _only_ours(read: Callable[[bytes], None]) -> Callable[[bytes], bool]:
     @functools.wraps(read)
-    def run(data: bytes) -> None:
+    def run(data: bytes) -> bool:
+        """Return whether the file was read, not refused."""
         try:
             read(data)
         except Env2MjcfError as error:
             if not error.diagnostic.message:
                 raise AssertionError("an error without a message") from error
+            return False
+        return True
 
     return run
 
 
-READERS: dict[str, Callable[[bytes], None]] = {
+READERS: dict[str, Callable[[bytes], bool]] = {
     name: _only_ours(read)
     for name, read in {
         "env": _env,

@@ -51,9 +51,9 @@ def main() -> int:
     in_use = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (in_use + _MEMORY, resource.RLIM_INFINITY))
     signal.signal(signal.SIGALRM, _too_slow)
-    warnings.filterwarnings("error", category=RuntimeWarning, module="env2mjcf")
+    warnings.simplefilter("error", RuntimeWarning)
     random_ = random.Random(options.seed)
-    tried, slowest, found = 0, 0.0, dict[str, int]()
+    tried, read, slowest, found = 0, 0, 0.0, dict[str, int]()
     end = time.monotonic() + options.seconds
     while time.monotonic() < end:
         data = mutated(random_.choice(starts), random_.choice(starts), random_)
@@ -61,7 +61,7 @@ def main() -> int:
         start = time.perf_counter()
         try:
             signal.setitimer(signal.ITIMER_REAL, _SECONDS)
-            run(data)
+            read += run(data)
         except (Exception, TooSlow) as error:
             signal.setitimer(signal.ITIMER_REAL, 0)
             at = traceback.extract_tb(error.__traceback__)[-1]
@@ -76,7 +76,9 @@ def main() -> int:
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
         slowest = max(slowest, time.perf_counter() - start)
-    print(f"{options.reader}: {tried} inputs, slowest {slowest:.2f} s, {len(found)} kinds of findings: {found}")
+    print(
+        f"{options.reader}: {tried} inputs, {read} of them read, slowest {slowest:.2f} s, {len(found)} kinds of findings: {found}"
+    )
     return 1 if found else 0
 
 

@@ -10,6 +10,7 @@ import math
 import re
 import sys
 import unicodedata
+import warnings
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,6 +64,12 @@ def tame_libraries() -> None:
     handler.setFormatter(_Printable("%(message)s"))
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
     logging.captureWarnings(True)
+    warnings.formatwarning = _without_place
+
+
+def _without_place(message: Warning | str, category: type[Warning], *_: object) -> str:
+    """Say what a warning says, not which line of whose code says it."""
+    return f"{category.__name__}: {message}"
 
 
 def print_parts(parts: Iterable[RenderableType]) -> None:

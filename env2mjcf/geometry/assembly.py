@@ -20,7 +20,7 @@ from .analysis import Analysis
 from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
-from .loading import load_mesh
+from .loading import LARGEST, load_mesh
 from .mesh import Mesh
 from .repair import Repaired, refuse_work, repair_diagnostics, repaired
 from .resolve import resolve_all
@@ -153,13 +153,14 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     for i, multibody in enumerate(environment.multibodies):
         kinematics = RobotKinematics.of(multibody, log)
         home = kinematics.home(log)
-        poses = kinematics.forward(home)
+        with _overflow_is_seen_later():
+            poses = kinematics.forward(home)
         bodies = [
             _Placed(name, body, pose, meshes.mesh(body))
             for name, body, pose in zip(names[i], multibody.bodies, poses, strict=True)
         ]
         placed.append((multibody, kinematics, home, bodies))
-    lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies])
+    lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies], log)
     thickness = _THICKNESS_PER_EXTENT * float(np.linalg.norm(upper - lower))
     _check_extent(environment, float(np.linalg.norm(upper - lower)), log)
     active, drawn = ({id(m) for m in group} for group in (environment.robots, environment.surfaces))
@@ -267,14 +268,27 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
                 )  # fmt: skip
 
 
-def _bounding_box(bodies: Sequence[_Placed]) -> tuple[Array, Array]:
+def _overflow_is_seen_later() -> np.errstate:
+    return np.errstate(over="ignore", invalid="ignore")
+
+
+def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array, Array]:
     """Return the corners of the box around the used vertices of all bodies; the unit cube for no bodies."""
     if not bodies:
         return np.full(3, -0.5), np.full(3, 0.5)
     corners: list[Array] = []
     for b in bodies:
         used = b.mesh.vertices[np.unique(b.mesh.faces)]
-        world = used @ b.pose[:3, :3].T + b.pose[:3, 3]
+        with _overflow_is_seen_later():
+            world = used @ b.pose[:3, :3].T + b.pose[:3, 3]
+        farthest = float(np.abs(world).max())
+        # Not a number compares as false.
+        if not farthest <= LARGEST:
+            log.fail(
+                GeometryError, "GEO252", b.name, f"{b.name} reaches {farthest:.3g} m from the origin at home; at most "
+                f"{LARGEST:g} can be computed with", hint="correct its pose, or the connections that lead to it",
+                span=b.body.span,
+            )  # fmt: skip
         corners += [world.min(axis=0), world.max(axis=0)]
     stacked = np.array(corners)
     return stacked.min(axis=0), stacked.max(axis=0)

@@ -29,7 +29,7 @@ _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] =
 _THROUGH_TRIMESH = (".stl", ".ply", ".off", ".glb")
 
 # Volumes and inertias of larger meshes overflow; MuJoCo's own numbers end at 3e38.
-_LARGEST = 1e30
+LARGEST = 1e30
 
 READABLE = (*_READERS, *_THROUGH_TRIMESH)
 
@@ -62,8 +62,8 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
         log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
     largest = float(np.abs(vertices).max())
-    if largest > _LARGEST:
-        message = f"{path} has a coordinate of {largest:.3g}; at most {_LARGEST:g} can be computed with"
+    if largest > LARGEST:
+        message = f"{path} has a coordinate of {largest:.3g}; at most {LARGEST:g} can be computed with"
         log.fail(GeometryError, "GEO276", str(path), message, hint="is the file damaged, or in another format?")
     return Mesh.from_arrays(path.stem, vertices, faces, path)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import mujoco
 
@@ -22,11 +24,7 @@ def load_model(document: Document, assembly: Assembly, log: DiagnosticLog) -> mu
     Raises:
         ConversionError: MuJoCo refuses it; the error has the line of the env file that the refusal comes from.
     """
-    try:
-        return load_spec(document).compile()
-    except ValueError as error:
-        refuse(str(error), document, assembly, log)
-        raise
+    return _compiled(lambda: load_spec(document), document, assembly, log)
 
 
 def load_spec(document: Document) -> mujoco.MjSpec:
@@ -47,20 +45,31 @@ def load_file(path: Path, document: Document, assembly: Assembly, log: Diagnosti
     Raises:
         ConversionError: MuJoCo refuses it.
     """
+    # Loading it without a spec, MuJoCo writes its warnings to a file in the current folder.
+    return _compiled(lambda: mujoco.MjSpec.from_file(str(path)), document, assembly, log)
+
+
+def _compiled(
+    spec: Callable[[], mujoco.MjSpec], document: Document, assembly: Assembly, log: DiagnosticLog
+) -> mujoco.MjModel:
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        return spec().compile()
+    except UserWarning as warning:
+        said = " ".join(str(warning).split())
+        log.fail(
+            ConversionError, "MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}",
+            hint="correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)",
+        )  # fmt: skip
     except ValueError as error:
-        refuse(str(error), document, assembly, log)
-        raise
+        _refuse(" ".join(str(error).split()), document, assembly, log)
 
 
-def refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> None:
+def _refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> NoReturn:
     """Raise MuJoCo's refusal as a `ConversionError` about the body that it concerns."""
     subject, span = _culprit(message, document, assembly)
-    first = " ".join(message.split())
     log.fail(
         ConversionError, "MJC401", subject or document.name,
-        f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {first}",
+        f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {message}",
         hint="" if span else "this may be a fault of env2mjcf: please report it with the scene", span=span,
     )  # fmt: skip
 
