@@ -77,7 +77,8 @@ def main() -> int:
             signal.setitimer(signal.ITIMER_REAL, 0)
         slowest = max(slowest, time.perf_counter() - start)
     print(
-        f"{options.reader}: {tried} inputs, {read} of them read, slowest {slowest:.2f} s, {len(found)} kinds of findings: {found}"
+        f"{options.reader}: {tried} inputs, {read} of them read, slowest {slowest:.2f} s, "
+        f"{len(found)} kinds of findings: {found}"
     )
     return 1 if found else 0
 
