@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -461,6 +462,24 @@ def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
     subprocess.run([sys.executable, "-c", code], check=True)
     words = [sys.executable, "-m", "env2mjcf", "plan", str(room / "open.env"), "--query", str(room / "cross.query")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("planner", ["RRTConnect", "PRM"])
+def test_the_collector_may_run_at_any_time(planner: str, room: Path):
+    """Freed memory is filled, so that whoever looks at it crashes."""
+    code = (
+        "import gc, env2mjcf\nfrom env2mjcf.planning import plan\n"
+        f"scene = env2mjcf.load({str(room / 'open.env')!r}, query={str(room / 'cross.query')!r}, engine='mujoco')\n"
+        "query = scene.queries[0]\n"
+        "for _ in range(2):\n"
+        f"    assert plan(scene, query.q[0], query.q[-1], planner={planner!r}, time=60).solved\n"
+        "    gc.collect()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONMALLOC": "debug"}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
 
 

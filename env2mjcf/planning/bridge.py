@@ -136,6 +136,21 @@ def _never() -> bool:
     return False
 
 
+class _States(base.StateValidityChecker):
+    """Answers about states.
+
+    Python's collector crashes on a `SpaceInformation` of OMPL 2.0.1 whose checker is a function, or OMPL's own.
+    """
+
+    def __init__(self, information: Any, is_valid: Callable[[Any], bool]) -> None:
+        super().__init__(information)
+        self._is_valid = is_valid
+
+    def isValid(self, state: Any) -> bool:
+        """Return whether a state is valid."""
+        return self._is_valid(state)
+
+
 class OmplRun:
     """One planner at work on one pair of configurations.
 
@@ -159,7 +174,8 @@ class OmplRun:
         states, self._layout = state_space(space)
         self._information = base.SpaceInformation(states)
         self._motions = _Motions(self._information, self._layout.read, validity)
-        self._information.setStateValidityChecker(self._motions.is_valid)
+        self._states = _States(self._information, self._motions.is_valid)
+        self._information.setStateValidityChecker(self._states)
         self._information.setMotionValidator(self._motions)
         self._information.setup()
         self._problem = base.ProblemDefinition(self._information)
