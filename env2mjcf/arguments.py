@@ -32,7 +32,8 @@ def positive(name: str, value: object, most: float | None = None) -> float:
         raise TypeError(f"{name} is {value!r}; expected a number")
     number = float(value)
     if not 0 < number < math.inf or (most is not None and number > most):
-        raise ValueError(f"{name} is {value}; expected a positive number" + (f" up to {most:g}" if most else ""))
+        limit = "" if most is None else f" up to {most:g}"
+        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
     return number
 
 

@@ -58,7 +58,7 @@ def kill_randomly(
             time.sleep(chance.uniform(0, life))
         else:
             while child.poll() is None and folders.files(out) <= known:
-                pass
+                time.sleep(0.0002)
             time.sleep(chance.uniform(0, writing))
         child.send_signal(signal.SIGKILL)
         ended = child.wait()

@@ -80,7 +80,7 @@ def answers(scene: env2mjcf.Scene, q: np.ndarray) -> dict[str, Any]:
     return {name: ask(scene, q) for name, ask in QUESTIONS.items()}
 
 
-def in_child(call: Callable[[], object], seconds: float = 60) -> str:
+def said_in_child(call: Callable[[], object], seconds: float = 60) -> str:
     """Return what a call says in a forked child; "stuck" if it takes too long."""
     read_end, write_end = os.pipe()
     child = os.fork()
@@ -267,7 +267,7 @@ class TestForks:
         q = rows(scene)
         expected = answers(scene, q)
         scene.in_collision(np.tile(q, (1000, 1)), threads=4)
-        assert in_child(lambda: answers(scene, q) == expected) == "True"
+        assert said_in_child(lambda: answers(scene, q) == expected) == "True"
         assert answers(scene, q) == expected
 
     def test_a_child_does_not_wait_for_threads_that_it_has_not(self) -> None:
@@ -277,7 +277,8 @@ class TestForks:
         expected = scene.clearance(q[:4]).tolist()
         fresh = env2mjcf.load(ALPHA)
         with elsewhere(fresh._queries._lock), elsewhere(fresh._lock):
-            assert in_child(lambda: (fresh.clearance(q[:4]).tolist() == expected, fresh.data.time)) == "(True, 0.0)"
+            said = said_in_child(lambda: (fresh.clearance(q[:4]).tolist() == expected, fresh.data.time))
+        assert said == "(True, 0.0)"
 
     def test_a_process_is_not_forked_while_the_engine_compiles(self) -> None:
         skip_without("fast")
@@ -297,10 +298,15 @@ class TestForks:
         env2mjcf.load(ALPHA).warm_up()
         holding = elsewhere(Compiling())
         holding.__enter__()
-        threading.Timer(0.5, lambda: holding.__exit__(None, None, None)).start()
-        began = time.monotonic()
-        assert in_child(free, 20) == "True"
-        assert time.monotonic() - began > 0.4
+        ended = threading.Event()
+
+        def end() -> None:
+            ended.set()
+            holding.__exit__(None, None, None)
+
+        # Long enough for a child that does not wait to be there before.
+        threading.Timer(0.5, end).start()
+        assert said_in_child(lambda: free() and ended.is_set(), 20) == "True"
 
     def test_a_child_that_is_forked_while_a_scene_warms_up_can_use_it(self) -> None:
         """In a process of its own, in which nothing has imported numba yet."""
@@ -315,7 +321,7 @@ class TestForks:
         q = scene.space.sample(60, seed=0)
         q = q[scene.is_valid(q)]
         way = plan(scene, q[0], q[-1], seed=1, shorten=False).path.tobytes()
-        assert in_child(lambda: plan(scene, q[0], q[-1], seed=1, shorten=False).path.tobytes() == way) == "True"
+        assert said_in_child(lambda: plan(scene, q[0], q[-1], seed=1, shorten=False).path.tobytes() == way) == "True"
 
     @needs_gl
     def test_a_picture_does_not_wait_for_children_that_were_forked_meanwhile(self) -> None:
@@ -335,7 +341,7 @@ class TestForks:
                 os.kill(sleeper, signal.SIGKILL)
                 os.waitpid(sleeper, 0)
         here = picture(scene, size=(32, 24)).tobytes()
-        assert in_child(lambda: picture(scene, size=(32, 24)).tobytes() == here) == "True"
+        assert said_in_child(lambda: picture(scene, size=(32, 24)).tobytes() == here) == "True"
 
 
 def warm_and_fork() -> list[str]:
@@ -345,7 +351,7 @@ def warm_and_fork() -> list[str]:
         scene = env2mjcf.load(ALPHA)
         scene.warm_up(wait=False)
         time.sleep(delay)
-        found.append(in_child(lambda scene=scene: bool(scene.clearance(scene.space.home) > -1)))
+        found.append(said_in_child(lambda scene=scene: bool(scene.clearance(scene.space.home) > -1)))
     return found
 
 

@@ -92,7 +92,7 @@ def test_poses_and_verdicts_of_any_scene(
     expected = [r.kinematics.forward(q[:, c]) for r, c in zip(robots, columns, strict=True)]
     assert np.allclose(poses, np.concatenate(expected, axis=1), rtol=0, atol=1e-9 * loaded.extent)
     for row, verdict in zip(q, loaded.in_collision(q), strict=True):
-        assert not truth.wrong(row, bool(verdict), 1e-4 * loaded.extent)
+        assert not truth.wrong(row, bool(verdict), 1e-5 * loaded.extent)
 
 
 @settings(max_examples=25, deadline=None)

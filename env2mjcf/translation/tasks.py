@@ -19,7 +19,7 @@ from .dh import swaps_angles
 _OTHER = {DofKind.THETA: DofKind.ALPHA, DofKind.ALPHA: DofKind.THETA}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DofMap:
     """From a robot's configurations to those of its translation.
 

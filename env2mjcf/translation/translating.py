@@ -14,7 +14,7 @@ from .losses import Losses
 from .tasks import DofMap
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Translation:
     """An environment in another dialect.
 
