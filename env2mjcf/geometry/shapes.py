@@ -197,9 +197,11 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
 def _shell_note(lining: Shells, volume: float) -> str:
     pinned = f"{_count(lining.pinned, 'thin prism')} where there is no room" if lining.pinned else "none a thin prism"
     split = f"{_count(lining.split, 'polygon')} split at thin spots, " if lining.split else ""
+    # A mesh that crosses itself may hold as much volume inside out as it holds otherwise.
+    times = f", {lining.volume / volume:.3g} times the solid's volume" if volume > 0 else ""
     return (
         f"{_count(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, {split}"
-        f"thinnest {lining.thinnest:.3g}, {lining.volume / volume:.3g} times the solid's volume"
+        f"thinnest {lining.thinnest:.3g}{times}"
     )
 
 
