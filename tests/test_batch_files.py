@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import stat
 from collections.abc import Callable
@@ -90,6 +91,21 @@ class TestForeignFiles:
         for _ in range(2):
             assert run(scene, "q.npy", "v.npy").rows == 10
             assert len(np.load("v.npy")) == 10
+
+    def test_one_that_comes_while_it_runs_is_kept(self, scene, monkeypatch) -> None:
+        saved(scene, 300)
+        monkeypatch.setattr(running_module, "_COMMIT_SECONDS", -1.0)
+        fresh = Path("v.npy.journal.new")
+
+        def come(done: int, _rows: int) -> None:
+            if done == 200:
+                fresh.write_text("mine")
+
+        with pytest.raises(env2mjcf.ConversionError, match="File exists"):
+            run(scene, "q.npy", "v.npy", advance=come)
+        assert fresh.read_text() == "mine"
+        fresh.unlink()
+        assert run(scene, "q.npy", "v.npy").resumed == 100
 
     @pytest.mark.parametrize("journal", [None, OURS])
     @pytest.mark.parametrize("ending", [".partial", ".journal.new"])
@@ -239,26 +255,37 @@ def test_the_longest_name_will_do(scene) -> None:
 
 
 @pytest.mark.parametrize("end", [folders.kill_at, folders.fail_at])
-def test_at_whatever_moment_it_ends_the_next_run_is_right(scene, tmp_path, monkeypatch, end) -> None:
-    """It is killed, or the disk is full, at each call that looks at or changes a file."""
+@pytest.mark.parametrize("row", [None, 0, 250])
+def test_at_whatever_moment_it_ends_the_next_run_is_right(scene, tmp_path, monkeypatch, end, row) -> None:
+    """It is killed, or the disk is full, at each call that looks at or changes a file; or a row is no good besides."""
     monkeypatch.setattr(running_module, "_COMMIT_SECONDS", -1.0)
     out = tmp_path / "out"
     out.mkdir()
     q = saved(scene, 300)
-    resumed: list[int] = []
-    for number in range(1, 200):
+    expected, broken = scene.in_collision(q), q.copy()
+    if row is not None:
+        broken[row, 0] = np.nan
+    np.save("broken.npy", broken)
+    resumed: set[int] = set()
+    for number in itertools.count(1):
+        untouched = tmp_path / f"untouched{number}"
 
-        def work(number: int = number) -> None:
-            end(number, out)
-            run(scene, tmp_path / "q.npy", out / "v.npy", threads=1)
+        def work(number: int = number, untouched: Path = untouched) -> None:
+            count = end(number, out)
+            try:
+                run(scene, tmp_path / "broken.npy", out / "v.npy", threads=1)
+            finally:
+                if count() < number:
+                    untouched.touch()
 
         status = folders.in_child(work)
         assert left(out) <= {"v.npy", "v.npy.partial", "v.npy.journal", "v.npy.journal.new"}
-        resumed.append(run(scene, "q.npy", out / "v.npy").resumed)
-        np.testing.assert_array_equal(np.load(out / "v.npy"), scene.in_collision(q))
+        resumed.add(run(scene, "q.npy", out / "v.npy").resumed)
+        np.testing.assert_array_equal(np.load(out / "v.npy"), expected)
         assert left(out) == {"v.npy"}
         (out / "v.npy").unlink()
-        if status == 0:
+        if untouched.exists():
             break
-    assert number > 12
-    assert set(resumed) >= {0, 100, 200, 300}
+    assert number > 10
+    assert resumed == {None: {0, 100, 200, 300}, 0: {0}, 250: {0, 100, 200}}[row]
+    assert status == (0 if row is None else 1)

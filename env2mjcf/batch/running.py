@@ -166,8 +166,8 @@ class _Work:
         """Answer what is not done yet, and keep what is, whatever happens."""
         rows, size = len(self._source), _FIRST
         committed = time.monotonic()
-        advance(self._done, rows)
         try:
+            advance(self._done, rows)
             while self._done < rows:
                 began = time.monotonic()
                 stop = min(self._done + size, rows)
