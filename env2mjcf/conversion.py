@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ConversionError, Diagnostic, DiagnosticLog
+from .locking import FolderBusyError
 from .model import Environment
 from .options import Options, PathArgument
 from .report import Report
-from .scene_folder import PATIENCE, FolderBusyError, Staged
+from .scene_folder import Staged
 from .simulation.loading import load_file
 from .simulation.preparing import prepare
 from .simulation.scene import Scene
@@ -110,10 +111,9 @@ def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
             str(folder),
             f"{folder} is, or lies under, a file; expected a folder to write to",
         )
-    except FolderBusyError:
+    except FolderBusyError as error:
         log.fail(
-            ConversionError, "MJC424", str(folder),
-            f"another process has kept {folder} locked for {PATIENCE:g} seconds",
+            ConversionError, "MJC424", str(folder), str(error),
             hint="is one stopped in the middle of writing there? End it, or choose another output folder",
         )  # fmt: skip
     except PermissionError as error:

@@ -196,7 +196,7 @@ CATALOGUE: dict[str, str] = {
     "CFG506": "The rows of a query are built in different ways.",
     "CFG507": "Velocities or info fields behind configurations are not used.",
     "CFG508": "A query holds one configuration only.",
-    "CFG509": "The output of a batch cannot be written.",
+    "CFG509": "The output of a batch cannot be written, or a file that is none of its own stands in its way.",
     # Paths and roadmaps.
     "CFG510": "The first line of a path file is not its header.",
     "CFG511": "The header of a path file is not written as the newest planner insists.",

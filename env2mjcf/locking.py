@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from contextlib import suppress
+import time
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from enum import Enum
+from pathlib import Path
+
+# Nobody needs more than a moment; a process that is stopped in that moment is not waited for forever.
+PATIENCE = 60.0
+_PAUSE = 0.005
+
+
+class FolderBusyError(Exception):
+    """Another process has kept a folder locked for too long."""
 
 
 class LockOutcome(Enum):
@@ -40,3 +52,27 @@ def unlock(handle: int) -> None:
 
         with suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_UN)
+
+
+@contextmanager
+def alone(folder: Path) -> Generator[None]:
+    """Keep other processes and threads from changing a folder, where the system can lock it.
+
+    Raises:
+        FolderBusyError: Another one does not let anybody in.
+        OSError: The folder cannot be opened.
+    """
+    if os.name == "nt":  # folders cannot be opened
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while try_lock(handle) is LockOutcome.TAKEN:
+            if time.monotonic() > deadline:
+                raise FolderBusyError(f"another process has kept {folder} locked for {PATIENCE:g} seconds")
+            time.sleep(_PAUSE)
+        yield
+    finally:
+        unlock(handle)
+        os.close(handle)

@@ -12,16 +12,13 @@ import os
 import re
 import secrets
 import time
-from collections.abc import Generator, Iterable, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
-from .locking import LockOutcome, try_lock, unlock
+from .locking import FolderBusyError, LockOutcome, alone, try_lock
 from .writing import replaced
 
-# Nobody needs more than a moment; a process that is stopped in that moment is not waited for forever.
-PATIENCE = 60.0
-_PAUSE = 0.005
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
 STALE_SECONDS = 3600.0
 
@@ -30,10 +27,6 @@ _STAGED_ASSET = re.compile(r"\.[0-9a-f]{16}-[^/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml
 _ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
 
 _BINARY = getattr(os, "O_BINARY", 0)
-
-
-class FolderBusyError(Exception):
-    """Another process has kept a folder locked for too long."""
 
 
 class Staged:
@@ -60,7 +53,7 @@ class Staged:
         self._handle, self._begun = -1, False
         (folder / "assets").mkdir(parents=True, exist_ok=True)
         try:
-            with _alone(folder):
+            with alone(folder):
                 with suppress(OSError):
                     _remove_stale(folder)
                 self._begun = True
@@ -89,7 +82,7 @@ class Staged:
             FolderBusyError: Another process does not let anybody write.
             OSError: It cannot be renamed; `discard` then removes what was written.
         """
-        with _alone(self.folder):
+        with alone(self.folder):
             self._close()
             self._retire()
             os.replace(self.path, self.final)
@@ -116,7 +109,7 @@ class Staged:
         self._close()
         if not self._begun:
             return
-        with suppress(OSError, FolderBusyError), _alone(self.folder):
+        with suppress(OSError, FolderBusyError), alone(self.folder):
             _remove(self.folder, self.path, self._made)
             self._remove_retired()
 
@@ -124,25 +117,6 @@ class Staged:
         handle, self._handle = self._handle, -1
         if handle >= 0:
             os.close(handle)
-
-
-@contextmanager
-def _alone(folder: Path) -> Generator[None]:
-    """Keep other processes and threads from changing a folder, where the system can lock it."""
-    if os.name == "nt":  # folders cannot be opened
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        deadline = time.monotonic() + PATIENCE
-        while try_lock(handle) is LockOutcome.TAKEN:
-            if time.monotonic() > deadline:
-                raise FolderBusyError(str(folder))
-            time.sleep(_PAUSE)
-        yield
-    finally:
-        unlock(handle)
-        os.close(handle)
 
 
 def _staged_name(name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -13,6 +13,8 @@ from .errors import ConversionError, DiagnosticLog
 from .options import PathArgument
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# Of a file, as much as tells what it is.
+_BEGINNING = 4096
 
 
 @contextmanager
@@ -74,10 +76,13 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
         inputs: Files that are read for it, those that are not there, too.
 
     Raises:
-        ConversionError: It is a folder, one of the inputs, or lies in no folder, or in one that may not be written.
+        ConversionError: It is a folder, one of the inputs, or lies in no folder, or in one that may not be written, or
+            no file can have its name.
     """
     path = Path(os.fsdecode(out))
-    if path.is_dir():
+    if reason := _against_name(path):
+        what = f"cannot be written: {reason}"
+    elif path.is_dir():
         what = "is a folder"
     elif path.exists() and any(os.path.exists(i) and os.path.samefile(path, i) for i in inputs):
         what = "is an input"
@@ -92,3 +97,45 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
     DiagnosticLog().fail(
         ConversionError, code, str(path), f"{path} {what}; expected a file to write", hint="name another output"
     )
+
+
+def _against_name(path: Path) -> str:
+    """Return what the system has against the name of a file, that it is too long, say."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        return error.strerror or str(error)
+    except ValueError as error:  # it holds a NUL character
+        return str(error)
+    return ""
+
+
+def refuse_foreign(out: Path, code: str, kind: str, belongs: Callable[[bytes], bool]) -> None:
+    """Refuse to replace a file that is of another kind than what is written, such as a scene that was named by mistake.
+
+    Args:
+        out: The file to write.
+        code: The code of the diagnostic.
+        kind: What is written, as "path file".
+        belongs: Says of the beginning of a file whether it is of that kind; nobody misses one of white space only.
+
+    Raises:
+        ConversionError: It is of another kind, or cannot be read.
+    """
+    if not out.is_file():
+        return
+    try:
+        with out.open("rb") as file:
+            beginning = file.read(_BEGINNING)
+    except OSError:
+        what = "cannot be read"
+    else:
+        if not beginning.strip() or belongs(beginning):
+            return
+        what = f"is no {kind}"
+    DiagnosticLog().fail(
+        ConversionError, code, str(out), f"{out} {what}, and is not replaced",
+        hint="choose another output, or remove the file",
+    )  # fmt: skip

@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from ..contact.batch import thread_count
 from ..options import PathArgument
 from ..simulation.scene import Scene
-from ..writing import refuse_unwritable
+from ..writing import refuse_foreign, refuse_unwritable
 from .identity import identity
-from .journal import Partial, Progress
+from .journal import Partial, Progress, companions
 from .source import Source, open_source
 
 What = Literal["collision", "valid", "clearance"]
@@ -77,12 +78,12 @@ def run(
 
     The output appears when it is whole. Until then there are `<output>.partial` and `<output>.journal`, from which the
     same call goes on after a crash, if the scene, its options and the rows that are done are the same; else it begins
-    anew.
+    anew. Files of these names that no batch has left are kept, and the call refused.
 
     Args:
         scene: Whom to ask.
         configurations: A .npy file of (n, dim) numbers, metres and radians.
-        output: A .npy file, of (n,) bools or, for clearances, floats; replaced if it exists.
+        output: A .npy file, of (n,) bools or, for clearances, floats; replaced if it exists and is one.
         what: "collision", "valid" or "clearance".
         file_units: The numbers are the env file's own.
         threads: As for `Scene.in_collision`, n being the rows of the file.
@@ -92,7 +93,8 @@ def run(
 
     Raises:
         FormatError: The file is not one of finite configurations; the message says which row and number is wrong.
-        ConversionError: The output cannot be written.
+        ConversionError: The output cannot be written, another process is writing it, or a foreign file has one of the
+            names.
         ValueError: `what` is something else.
     """
     if what not in WHAT:
@@ -100,10 +102,14 @@ def run(
     source = open_source(str(configurations), scene.space, file_units)
     target = Path(output)
     refuse_unwritable(target, "CFG509", [configurations])
+    for companion in companions(target):
+        refuse_unwritable(companion, "CFG509", [configurations])
+    refuse_foreign(target, "CFG509", "NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
     count = None if executor is not None and threads is None else thread_count(threads, len(source))
+    job = identity(scene, what, file_units)
     partial = Partial(target)
     try:
-        work = _Work(scene, source, partial, identity(scene, what, file_units), what)
+        work = _Work(scene, source, partial, job, what)
         resumed = work.prepare(say or _ignore)
         began = time.perf_counter()
         work.do(count, executor, advance or _ignore)
@@ -128,8 +134,8 @@ class _Work:
 
     def prepare(self, say: Callable[[str], None]) -> int:
         """Take up an earlier run's work or begin anew; return how many rows are done."""
-        earlier, rows = self._partial.progress(), len(self._source)
-        if earlier is not None:
+        earlier, rows = self._partial.earlier, len(self._source)
+        if earlier is not None and earlier.done:
             reason = self._differs(earlier)
             answers = None if reason else self._partial.resume(rows, self._kind)
             if answers is not None:
@@ -138,7 +144,7 @@ class _Work:
                 return earlier.done
             say(f"beginning anew: {reason or 'the unfinished output of the earlier run is damaged'}")
             self._digest = hashlib.blake2b(digest_size=20)
-        self.answers = self._partial.begin(rows, self._kind)
+        self.answers = self._partial.begin(self._progress(), self._kind)
         return 0
 
     def _differs(self, earlier: Progress) -> str:
@@ -146,7 +152,7 @@ class _Work:
         if earlier.job != self._job:
             return "the scene, its options or the question are not those of the unfinished earlier run"
         changed = "the configurations are not those of the unfinished earlier run"
-        if earlier.rows != len(self._source) or not 0 <= earlier.done <= earlier.rows:
+        if earlier.rows != len(self._source) or earlier.done > earlier.rows:
             return changed
         step = self._most()
         for start in range(0, earlier.done, step):
@@ -160,8 +166,8 @@ class _Work:
         """Answer what is not done yet, and keep what is, whatever happens."""
         rows, size = len(self._source), _FIRST
         committed = time.monotonic()
-        advance(self._done, rows)
         try:
+            advance(self._done, rows)
             while self._done < rows:
                 began = time.monotonic()
                 stop = min(self._done + size, rows)
@@ -189,7 +195,10 @@ class _Work:
         self._done = stop
 
     def _commit(self) -> None:
-        self._partial.commit(Progress(self._job, len(self._source), self._done, self._digest.hexdigest()))
+        self._partial.commit(self._progress())
+
+    def _progress(self) -> Progress:
+        return Progress(self._job, len(self._source), self._done, self._digest.hexdigest())
 
 
 def _summary(answers: NDArray[Any], what: What) -> tuple[dict[str, int], float | None]:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 
-from ..errors import ConversionError, DiagnosticLog
 from ..formats.path import begins_as_path
-
-# Of a file, as much as tells what it is.
-_BEGINNING = 4096
+from ..writing import refuse_foreign
 
 
 def refuse_foreign_path(out: Path) -> None:
@@ -18,12 +14,4 @@ def refuse_foreign_path(out: Path) -> None:
     Raises:
         ConversionError: It is none.
     """
-    if not out.is_file():
-        return
-    with suppress(OSError), out.open("rb") as file:
-        beginning = file.read(_BEGINNING).decode("utf-8", "replace")
-        if beginning.strip() and not begins_as_path(beginning):
-            DiagnosticLog().fail(
-                ConversionError, "CFG553", str(out), f"{out} is no path file, and is not replaced",
-                hint="choose another output, or remove the file",
-            )  # fmt: skip
+    refuse_foreign(out, "CFG553", "path file", lambda beginning: begins_as_path(beginning.decode("utf-8", "replace")))
