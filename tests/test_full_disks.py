@@ -28,6 +28,7 @@ from env2mjcf.writing import replaced
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX limits, permissions and mounts")
 GL = offscreen.backend() is not None
 OLD = b"VIZMO_PATH_FILE   Path Version 2012\nwhat was there before\n"
+OLD_ENV = b"1\nPassive\nbefore.g 0 0 0 0 0 0\n"
 
 # Verb and all its words but the output, its name, the code of the error.
 VERBS = {
@@ -98,11 +99,16 @@ def filled(disk: Path, name: str, inputs: Path) -> dict[str, bytes]:
         # A conversion of something else, whose assets go when it is replaced.
         env2mjcf.convert(inputs / "other" / "scene.env", disk / name)
     else:
-        (disk / name).write_bytes(OLD)
+        (disk / name).write_bytes(older(name))
     with (disk / "filler").open("wb", buffering=0) as file, suppress(OSError):
         while file.write(bytes(1024)):
             pass
     return content(disk)
+
+
+def older(name: str) -> bytes:
+    """Return what an older output holds."""
+    return {".xml": b"<mujoco/>", ".env": OLD_ENV}.get(Path(name).suffix, OLD)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -155,7 +161,7 @@ def test_wherever_the_disk_is_full_nothing_is_left(verb: str, inputs: Path, full
 
 @some_verbs
 def test_a_file_may_not_grow_beyond_the_limit_of_the_process(verb: str, inputs: Path, tmp_path: Path) -> None:
-    (tmp_path / VERBS[verb][1]).write_bytes(b"<mujoco/>" if verb == "convert" else OLD)
+    (tmp_path / VERBS[verb][1]).write_bytes(older(VERBS[verb][1]))
     before = content(tmp_path)
     found = run(verb, inputs, tmp_path, lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     if verb in DRAWING:
@@ -172,7 +178,7 @@ def test_a_file_may_not_grow_beyond_the_limit_of_the_process(verb: str, inputs: 
 def test_a_folder_that_may_not_be_written_is_said(verb: str, inputs: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    (out / VERBS[verb][1]).write_bytes(b"<mujoco/>" if verb == "convert" else OLD)
+    (out / VERBS[verb][1]).write_bytes(older(VERBS[verb][1]))
     for above in (out, *out.parents[:3]):
         above.chmod(0o755)
     before = content(tmp_path)
