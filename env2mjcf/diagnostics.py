@@ -74,6 +74,8 @@ CATALOGUE: dict[str, str] = {
     "ENV180": "An XML file has more elements, or more within each other, than `limits.elements` and `limits.nesting`.",
     "ENV181": "An XML file holds a text or an attribute of more than ten million characters.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
+    # What a translation does not replace.
+    "ENV190": "A file that is no env file, robot file or query, or none of the scene that is replaced, is kept.",
     # Text files that are doubtful.
     "ENV201": "A keyword is written in a case that the original reader does not take.",
     "ENV202": "A keyword is misspelt, or another word stands in its place; it was read as meant.",

@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from collections.abc import Callable, Generator, Sequence
+import shutil
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import ConversionError, DiagnosticLog
@@ -28,12 +30,8 @@ def replaced(file: str | os.PathLike[str]) -> Generator[Path]:
         OSError: It cannot be written, or something stands there that is no regular file, such as a device.
     """
     path = Path(os.fsdecode(file))
-    if "\0" in path.name:
-        raise OSError(errno.EINVAL, "its name holds a NUL character", str(path))
-    # Renaming would put a file in the place of /dev/null.
-    if path.exists() and not path.is_file():
-        raise OSError(errno.EINVAL, "it is no regular file", str(path))
-    beside = path.with_name(f".{secrets.token_hex(8)}-{path.name}")
+    _refuse_special(path)
+    beside = _beside(path)
     try:
         yield beside
         os.replace(beside, path)
@@ -55,9 +53,96 @@ def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
     Raises:
         ConversionError: It cannot be written.
     """
+    with _said(file, code), replaced(file) as beside:
+        yield beside
+
+
+def write_together(contents: Mapping[Path, bytes], code: str) -> None:
+    """Write several files, or leave all as they were where one cannot be written.
+
+    All are written beside their places, and what they replace is copied, before the first is renamed; an error then
+    takes back what was renamed. A process that is killed between two renames leaves the first files new, the others
+    old, and what lies beside them.
+
+    Args:
+        contents: What to write, in the order in which it is renamed.
+        code: The code of the diagnostic.
+
+    Raises:
+        ConversionError: A file cannot be written.
+    """
+    replacements = {path: _Replacement(path, _beside(path), _beside(path)) for path in contents}
     try:
-        with replaced(file) as beside:
-            yield beside
+        for path, data in contents.items():
+            with _said(path, code):
+                replacements[path].stage(data)
+        for path, replacement in replacements.items():
+            with _said(path, code):
+                replacement.rename()
+    except BaseException:
+        for replacement in replacements.values():
+            with suppress(OSError):
+                replacement.take_back()
+        raise
+    for replacement in replacements.values():
+        with suppress(OSError):
+            replacement.old.unlink(missing_ok=True)
+
+
+@dataclass(slots=True)
+class _Replacement:
+    """A file that is replaced together with others.
+
+    Attributes:
+        path: Its place.
+        new: What comes there.
+        old: A copy of what is there; missing where nothing is.
+        begun: Whether it may have been renamed: an interrupt may come as soon as it is.
+    """
+
+    path: Path
+    new: Path
+    old: Path
+    begun: bool = False
+
+    def stage(self, data: bytes) -> None:
+        _refuse_special(self.path)
+        if os.path.lexists(self.path):
+            shutil.copy2(self.path, self.old, follow_symlinks=False)
+        self.new.write_bytes(data)
+
+    def rename(self) -> None:
+        self.begun = True
+        os.replace(self.new, self.path)
+
+    def take_back(self) -> None:
+        """Put back what was there; a copy that cannot be put back stays where it is."""
+        if not self.begun or self.new.exists():
+            self.new.unlink(missing_ok=True)
+            self.old.unlink(missing_ok=True)
+        elif os.path.lexists(self.old):
+            os.replace(self.old, self.path)
+        else:
+            self.path.unlink()
+
+
+def _refuse_special(path: Path) -> None:
+    if "\0" in path.name:
+        raise OSError(errno.EINVAL, "its name holds a NUL character", str(path))
+    # Renaming would put a file in the place of /dev/null.
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{secrets.token_hex(8)}-{path.name}")
+
+
+@contextmanager
+def _said(file: str | os.PathLike[str], code: str) -> Generator[None]:
+    """Say what the system has against a file that is written."""
+    try:
+        yield
     except OSError as error:
         path = os.fsdecode(file)
         full = error.errno in _FULL

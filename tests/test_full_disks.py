@@ -29,7 +29,11 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX limits, permis
 GL = offscreen.backend() is not None
 OLD = b"VIZMO_PATH_FILE   Path Version 2012\nwhat was there before\n"
 # What may be replaced, by the end of the name.
-OLD_FILES = {".xml": b"<mujoco/>", ".npy": b"\x93NUMPY what was there before"}
+OLD_FILES = {
+    ".xml": b"<mujoco/>",
+    ".npy": b"\x93NUMPY what was there before",
+    ".env": b"1\nPassive\nbefore.g 0 0 0 0 0 0\n",
+}
 
 # Verb and all its words but the output, its name, the code of the error.
 VERBS = {
@@ -100,11 +104,16 @@ def filled(disk: Path, name: str, inputs: Path) -> dict[str, bytes]:
         # A conversion of something else, whose assets go when it is replaced.
         env2mjcf.convert(inputs / "other" / "scene.env", disk / name)
     else:
-        (disk / name).write_bytes(OLD_FILES.get(Path(name).suffix, OLD))
+        (disk / name).write_bytes(older(name))
     with (disk / "filler").open("wb", buffering=0) as file, suppress(OSError):
         while file.write(bytes(1024)):
             pass
     return content(disk)
+
+
+def older(name: str) -> bytes:
+    """Return what an output of this name may replace."""
+    return OLD_FILES.get(Path(name).suffix, OLD)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -157,8 +166,7 @@ def test_wherever_the_disk_is_full_nothing_is_left(verb: str, inputs: Path, full
 
 @some_verbs
 def test_a_file_may_not_grow_beyond_the_limit_of_the_process(verb: str, inputs: Path, tmp_path: Path) -> None:
-    old = tmp_path / VERBS[verb][1]
-    old.write_bytes(OLD_FILES.get(old.suffix, OLD))
+    (tmp_path / VERBS[verb][1]).write_bytes(older(VERBS[verb][1]))
     before = content(tmp_path)
     found = run(verb, inputs, tmp_path, lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)))
     if verb in DRAWING:
@@ -175,8 +183,7 @@ def test_a_file_may_not_grow_beyond_the_limit_of_the_process(verb: str, inputs: 
 def test_a_folder_that_may_not_be_written_is_said(verb: str, inputs: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    old = out / VERBS[verb][1]
-    old.write_bytes(OLD_FILES.get(old.suffix, OLD))
+    (out / VERBS[verb][1]).write_bytes(older(VERBS[verb][1]))
     for above in (out, *out.parents[:3]):
         above.chmod(0o755)
     before = content(tmp_path)

@@ -26,7 +26,8 @@ class Translate:
 
     Links, limits, tested pairs and boundary stay what they are; what the dialect cannot express is said, and what would
     move links is refused. In dialect E each robot gets a file of its own beside the env file: new.env and new.robot.
-    Configurations of --query are turned into the dialect's numbers: new.query. Meshes stay where they are.
+    Configurations of --query are turned into the dialect's numbers: new.query. Meshes stay where they are. An older
+    new.env is replaced, with its new.robot and new.query; nothing else is.
 
     Examples:
       env2mjcf translate serial.env -o new.env --dialect D --box -10 10 -10 10 -10 10
@@ -43,7 +44,7 @@ class Translate:
         semantics: Whose reading of a dialect A connection: the planner's, or the web page's.
         read_as: Read the scene as this dialect instead of telling it from the text.
         mesh_dirs: More folders in which meshes are looked for.
-        allow_outside: May a problem name files outside its folder.
+        allow_outside: May a problem, or its scene, name files outside their folder.
         box: A boundary for a scene that has none, in file units; dialects C to E must have one.
         strict: Refuse whatever would be lost.
         limits: Bounds on hostile input.
@@ -73,8 +74,9 @@ class Translate:
             raise ValueError(f"--out is {self.out}; expected a file that ends in .env")
         scene = read(self.scene, **self._options())
         result = translate(scene, self.dialect, strict=self.strict, boundary=self._boundary())
-        inputs = [str(p) for p in (self.scene, *self.robots, *([self.query] if self.query else []))]
-        written = write_environment(result.environment, self.out, mesh_dirs=self.mesh_dirs, inputs=inputs)
+        written = write_environment(
+            result.environment, self.out, mesh_dirs=self.mesh_dirs, allow_outside=self.allow_outside
+        )
         log = DiagnosticLog()
         for found in (scene.diagnostics, result.notes, written.notes):
             log.extend(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,16 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
             hint="give a robot file with robots=[...] (--robots)",
         )  # fmt: skip
     tasks = _tasks(environment, problem, first_robot, options, log)
-    return dataclasses.replace(environment, tasks=tasks, path=source.path, diagnostics=tuple(log))
+    sources = _sources(source, environment, robots, options)
+    return dataclasses.replace(environment, tasks=tasks, path=source.path, sources=sources, diagnostics=tuple(log))
+
+
+def _sources(
+    source: Source, environment: Environment, robots: Sequence[MultiBody], options: Options
+) -> tuple[str, ...]:
+    # The env file that a problem names is another than the problem.
+    names = (source.path, environment.path, *(r.robot_file for r in robots), options.query)
+    return tuple(dict.fromkeys(os.fsdecode(name) for name in names if name))
 
 
 def robot_dofs(environment: Environment, log: DiagnosticLog) -> list[int]:

@@ -12,12 +12,20 @@ from ..options import Options
 
 
 @dataclass(frozen=True, slots=True)
-class _Problem:
+class Problem:
+    """Why a mesh file cannot be used.
+
+    Attributes:
+        code, name, message, hint, span: Those of the diagnostic.
+        path: Where the file is; None where there is none.
+    """
+
     code: str
     name: str
     message: str
     hint: str
     span: Span | None
+    path: Path | None = None
 
 
 def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) -> dict[str, Path]:
@@ -33,25 +41,7 @@ def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) 
     Raises:
         GeometryError: One or more files are missing, forbidden or unreadable; one error names them all.
     """
-    for extra in options.mesh_dirs:
-        if not Path(extra).is_dir():
-            log.warn(
-                GeometryError, "GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder",
-                hint="check the path: it is relative to the current directory",
-            )  # fmt: skip
-    finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
-    found: dict[str, Path] = {}
-    problems: dict[str, _Problem] = {}
-    for multibody in environment.multibodies:
-        for body in multibody.bodies:
-            name = body.filename
-            if name in found or name in problems:
-                continue
-            result = finder.find(name, body.span)
-            if isinstance(result, _Problem):
-                problems[name] = result
-            else:
-                found[name] = result
+    found, problems = find_all(environment, options, log)
     if problems:
         first, *others = problems.values()
         message, hint = first.message, first.hint
@@ -65,6 +55,36 @@ def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) 
     return found
 
 
+def find_all(
+    environment: Environment, options: Options, log: DiagnosticLog
+) -> tuple[dict[str, Path], dict[str, Problem]]:
+    """Find the mesh files of a scene as `resolve_all` does, and tell what is wrong with the others.
+
+    Returns:
+        Path of each file name, and why the others cannot be used, in the order of the bodies.
+    """
+    for extra in options.mesh_dirs:
+        if not Path(extra).is_dir():
+            log.warn(
+                GeometryError, "GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder",
+                hint="check the path: it is relative to the current directory",
+            )  # fmt: skip
+    finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
+    found: dict[str, Path] = {}
+    problems: dict[str, Problem] = {}
+    for multibody in environment.multibodies:
+        for body in multibody.bodies:
+            name = body.filename
+            if name in found or name in problems:
+                continue
+            result = finder.find(name, body.span)
+            if isinstance(result, Problem):
+                problems[name] = result
+            else:
+                found[name] = result
+    return found, problems
+
+
 class _Finder:
     """Looks for files in a list of folders."""
 
@@ -74,10 +94,10 @@ class _Finder:
         self._allow_outside = allow_outside
         self._log = log
 
-    def find(self, name: str, span: Span | None) -> Path | _Problem:
+    def find(self, name: str, span: Span | None) -> Path | Problem:
         """Return where a file is, or why it cannot be used."""
         if "\0" in name:
-            return _Problem("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
+            return Problem("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
         slashed = name.replace("\\", "/")
         found = self._first_file(name)
         if found is None and slashed != name:
@@ -95,7 +115,7 @@ class _Finder:
         if not self._inside(found):
             return self._outside(found, span)
         if not os.access(found, os.R_OK):
-            return _Problem("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span)
+            return Problem("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span, found)
         return found
 
     def _candidates(self, name: str) -> list[Path]:
@@ -117,29 +137,30 @@ class _Finder:
         real = os.path.realpath(path)
         return any(real == f or real.startswith(os.path.join(f, "")) for f in self._real_folders)
 
-    def _outside(self, found: Path, span: Span | None) -> _Problem:
-        return _Problem(
+    def _outside(self, found: Path, span: Span | None) -> Problem:
+        return Problem(
             "GEO202",
             str(found),
             f"{str(found)!r} lies outside the scene's folder and mesh_dirs",
             f"if you trust the scene: allow_outside=True (--allow-outside), or mesh_dirs=[{str(found.parent)!r}]",
             span,
+            found,
         )
 
-    def _missing(self, name: str, span: Span | None) -> _Problem:
+    def _missing(self, name: str, span: Span | None) -> Problem:
         slashed = name.replace("\\", "/")
         candidates = self._candidates(slashed)
         for candidate in candidates:
             if os.path.lexists(candidate) and self._inside(candidate):
                 kind = "folder" if candidate.is_dir() else "broken link or a special file"
-                return _Problem("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
+                return Problem("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
         places = ", ".join(repr(str(c)) for c in candidates)
         # Folders outside are not listed: an error message must not show what they hold.
         near = [x for c in candidates if self._inside(c.parent) for x in _listing(c.parent)]
         hint = (
             did_you_mean(PurePosixPath(slashed).name, near) or "add the folder that holds it to mesh_dirs (--mesh-dirs)"
         )
-        return _Problem("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
+        return Problem("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
 
 
 def _match_case(folder: Path, name: str) -> Path | None:
