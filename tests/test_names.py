@@ -305,6 +305,20 @@ def test_nothing_outside_the_folder_is_opened(name: str, place: str, tmp_path: P
     assert caught.value.code in ("GEO201", "GEO202", "GEO203", "ENV101", "ENV104", "ENV150")
 
 
+@pytest.mark.parametrize(
+    "identifier", ['SYSTEM "http://127.0.0.1:9/e.dtd"', 'PUBLIC "e" "http://localhost/e.dtd"', 'SYSTEM "../e.dtd"']
+)
+def test_a_document_type_elsewhere_is_not_fetched(tmp_path: Path, identifier: str) -> None:
+    here = tmp_path / "here"
+    here.mkdir()
+    (tmp_path / "e.dtd").write_text("<!ELEMENT Environment ANY>")
+    scene = here / "scene.xml"
+    scene.write_text(f"<!DOCTYPE Environment {identifier}>\n<Environment/>")
+    with watching(tmp_path, here) as opened:
+        assert env2mjcf.read(scene).multibodies == ()
+    assert opened == []
+
+
 class watching:
     """Collects what is opened below a folder but not below another, devices, and connections, while it lasts."""
 
