@@ -41,7 +41,7 @@ CATALOGUE: dict[str, str] = {
     "ENV141": "An XML element lacks an attribute.",
     "ENV142": "An XML attribute is none of the words that it can be.",
     "ENV143": "An XML attribute holds more than was expected.",
-    "ENV144": "An XML file declares entities.",
+    "ENV144": "An XML file declares entities, or names others than the five of XML.",
     "ENV145": "An XML element does not have exactly one child of a kind.",
     "ENV146": "The links of an XML robot do not stand in the order of their indices.",
     "ENV147": "A link of an XML robot does not hold the one connection that leads to it.",
@@ -72,7 +72,7 @@ CATALOGUE: dict[str, str] = {
     "ENV179": "A translation cannot be written.",
     # Limits.
     "ENV180": "An XML file has more elements, or more within each other, than `limits.elements` and `limits.nesting`.",
-    "ENV181": "An XML file holds a text or an attribute of more than ten million characters.",
+    "ENV181": "An XML file holds a text of more than ten million characters, or a name of more than fifty thousand.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
     # What a translation does not replace.
     "ENV190": "A file that is no env file, robot file or query, or none of the scene that is replaced, is kept.",
@@ -194,7 +194,7 @@ CATALOGUE: dict[str, str] = {
     "CFG502": "A word in a row of configurations is not a finite number.",
     "CFG503": "A file holds no configuration.",
     "CFG504": "A row of numbers fits no robot.",
-    "CFG505": "A NumPy file holds no finite rows of numbers.",
+    "CFG505": "A NumPy file holds no rows of numbers, or one that is not finite or too large.",
     "CFG506": "The rows of a query are built in different ways.",
     "CFG507": "Velocities or info fields behind configurations are not used.",
     "CFG508": "A query holds one configuration only.",

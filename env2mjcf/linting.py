@@ -20,7 +20,7 @@ from .formats.lexer import Scanner
 from .formats.reading import read_scene
 from .formats.robot import read_robot
 from .formats.source import read_source
-from .formats.xml import parse_xml
+from .formats.xml_parsing import parse_xml
 from .geometry.loading import READABLE, load_mesh
 from .geometry.repair import refuse_work, repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
@@ -29,7 +29,8 @@ from .model import Body, Environment, MultiBody, MultiBodyKind
 from .options import Options, PathArgument
 from .work import TooMuchWorkError, Work
 
-_ROOT_TAG = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*<([A-Za-z_][\w:.\-]*)", re.DOTALL)
+# What is skipped is never tried in another way: comments could end at each of the marks behind their own.
+_ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
 _SCENE_TAGS = ("environment", "motionplanning", "motion_planning", "mpproblem", "problem")
 _SNIFFED_BYTES = 1 << 16
 
@@ -199,10 +200,7 @@ def _resolved(environment: Environment, body: Body, options: Options, log: Diagn
 
 def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
     source = read_source(path, log, options.limits)
-    if is_xml(source):
-        robot = xml_scene.read_robot(parse_xml(source, log, options.limits))
-    else:
-        robot = read_robot(Scanner(source, log, options.limits))
+    robot = xml_scene.read_robot(parse_xml(source, log)) if is_xml(source) else read_robot(Scanner(source, log))
     RobotKinematics.of(robot, log).home(log)
 
 

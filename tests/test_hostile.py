@@ -9,6 +9,7 @@ import time
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import fields
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,22 +17,29 @@ import numpy as np
 import pytest
 
 import env2mjcf
+from env2mjcf.batch.source import open_source
+from env2mjcf.cli.configurations import of_file
 from env2mjcf.errors import DiagnosticLog, Env2MjcfError
 from env2mjcf.formats.byu import read_byu
 from env2mjcf.formats.gms import read_gms
+from env2mjcf.formats.lexer import parse_integer
 from env2mjcf.formats.obj import read_obj
+from env2mjcf.formats.path import read_path
 from env2mjcf.formats.query import read_query
 from env2mjcf.formats.roadmap import read_roadmap
 from env2mjcf.formats.source import Source
 from env2mjcf.geometry.loading import load_mesh
 from env2mjcf.geometry.mesh import Mesh
 from env2mjcf.geometry.repair import repaired
+from env2mjcf.linting import lint
 from env2mjcf.options import Limits
 from env2mjcf.work import TooMuchWorkError, Work
 
 BOX = "Boundary Box [0:1;0:1;0:1]\nMultibodies\n"
 CUBE = "1 8 12 36\n1 12\n" + "".join(f"{x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
 CUBE += "1 2 -4\n1 4 -3\n5 7 -8\n5 8 -6\n1 5 -6\n1 6 -2\n3 4 -8\n3 8 -7\n1 3 -7\n1 7 -5\n2 6 -8\n2 8 -4\n"
+ROBOT = "Active\n1\ncube.g Planar Rotational\nConnections\n0\n"
+PATH = "VIZMO_PATH_FILE   Path Version 2012\n1\n"
 BASE = '<Base filename="x.g" type="fixed" transform="0 0 0 0 0 0"/>'
 MEGA = 1 << 20
 
@@ -89,6 +97,13 @@ def loose_triangles(count: int) -> Mesh:
     return Mesh.from_arrays("loose", corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
 
 
+def byu(mesh: Mesh) -> str:
+    rows = "".join(f"{x} {y} {z}\n" for x, y, z in mesh.vertices.tolist())
+    faces = "".join(f"{a} {b} -{c}\n" for a, b, c in mesh.faces + 1)
+    n, m = len(mesh.vertices), len(mesh.faces)
+    return f"1 {n} {m} {3 * m}\n1 {m}\n{rows}{faces}"
+
+
 def star(corners: int) -> str:
     """A polygon of which every other corner is reflex."""
     angle = 2 * np.pi * np.arange(corners) / corners
@@ -105,13 +120,27 @@ class TestTime:
         "attributes of an element": (lambda n: xml(passive(BASE.replace("/>", f"{many_attributes(n)}/>"))), 2000),
         "blanks in an XML declaration": (lambda n: f"<?xml {' ' * n}?><Environment/>", 20_000),
         "elements on one line": (lambda n: xml("<a/>" * n), 5000),
+        "attributes of the root": (lambda n: xml("").replace(">", f"{many_attributes(n)}>", 1), 10_000),
+        "quotes in front of the root": (lambda n: "<!DOCTYPE e " + "<!--" * n, 10_000),
+        "entities that are not closed": (lambda n: xml("&a" * n), 10_000),
+        "options that are not closed": (lambda n: BOX + "1\nPassive\nx.g " + "-a(" * n, 20_000),
+        "digits that are no number": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}x", 5000),
+        "digits on both sides of a point": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}.{'1' * n}x", 5000),
     }  # fmt: skip
     MAPS: ClassVar[dict[str, tuple[Callable[[int], str], int]]] = {
         "hashes": (lambda n: "#" * n, 20_000),
         "a long word": (lambda n: "x" * n + "GRAPHSTAR", 20_000),
         "sections without end": (lambda n: "#####LPSTART#####\n" * n + "#####GRAPHSTART#####\n0 0 0\n", 500),
         "hashes in a section": (lambda n: f"#####LPSTART#####\n{'#' * n}\n#####GRAPHSTART#####\n0 0 0\n", 5000),
+        "digits that are no number": (lambda n: f"#####GRAPHSTART#####\n1 0 1\n0 {'1' * n}x 0 0 0 0 0\n", 5000),
     }
+    DIGITS: ClassVar[dict[str, Callable[[str], object]]] = {
+        "byu": lambda w: read_byu(f"1 3 1 3\n1 1\n{w} 0 0\n1 0 0\n0 1 0\n1 2 -3\n", "x", DiagnosticLog(), Limits()),
+        "obj": lambda w: read_obj(f"v {w} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "x", DiagnosticLog(), Limits()),
+        "query": lambda w: rows_of(f"{w} 0 0\n", Limits()),
+        "path": lambda w: read_path(Source.of("x", f"{PATH}1\n{w} 0 0\n"), (3,), (1,), DiagnosticLog()),
+        "count of a path": lambda w: read_path(Source.of("x", f"{PATH}{w}\n0 0 0\n"), (3,), (1,), DiagnosticLog()),
+    }  # fmt: skip
 
     @staticmethod
     def grows(run: Callable[[str], object], make: Callable[[int], str], size: int) -> float:
@@ -136,6 +165,42 @@ class TestTime:
     def test_of_a_roadmap(self, name: str) -> None:
         assert self.grows(roadmap, *self.MAPS[name]) < 10
 
+    @pytest.mark.parametrize("reader", DIGITS)
+    def test_of_digits_that_are_no_number(self, reader: str) -> None:
+        assert self.grows(self.DIGITS[reader], lambda n: f"{'1' * n}x", 5000) < 10
+
+    def test_of_rows_of_text(self, read: Reader) -> None:
+        read.file(CUBE, "cube.g")
+        scene = read.scene(BOX + "1\n" + ROBOT)
+
+        def run(text: str) -> None:
+            of_file(scene, str(read.file(text, "rows.csv")), False, Limits(), DiagnosticLog())
+
+        assert self.grows(run, lambda n: f"0 0 {'1' * n}x\n", 5000) < 10
+
+    def test_of_edges_of_a_robot_that_cannot_move(self) -> None:
+        def run(text: str) -> None:
+            read_roadmap(Source.of("x.map", text), (0, 6), DiagnosticLog())
+            read_roadmap(Source.of("x.map", text), (0,), DiagnosticLog())
+
+        def many(n: int) -> str:
+            return f"#####GRAPHSTART#####\n1 {n} 1\n0 {n}\n" + f"0 {n} 1\n" * n + "#####GRAPHSTOP#####\n"
+
+        assert self.grows(run, many, 500) < 10
+
+    def test_of_rows_of_many_robots(self) -> None:
+        def run(text: str) -> None:
+            read_query(Source.of("x.query", text), (0,) * text.count("\n"), DiagnosticLog())
+
+        assert self.grows(run, lambda n: "".join(f"{i}\n" for i in range(n)), 2000) < 10
+
+    def test_of_telling_what_a_file_is(self, read: Reader) -> None:
+        def run(text: str) -> None:
+            lint([read.file(text, "hostile.xml")])
+
+        # Each comment could end where any later one does: this is exponential, not quadratic.
+        assert self.grows(run, lambda n: "<!---->" * n + "x", 6) < 10
+
     def test_triangles_without_neighbours_are_not_compared_each_with_each(self) -> None:
         def steps(count: int) -> int:
             work = Work()
@@ -148,9 +213,7 @@ class TestTime:
 class TestWork:
     def test_a_mesh_that_takes_too_much_is_refused(self, read: Reader) -> None:
         text = BOX + "1\nPassive\nmesh.g 0 0 0 0 0 0\n"
-        mesh = loose_triangles(100)
-        rows = "".join(f"{x} {y} {z}\n" for x, y, z in mesh.vertices.tolist())
-        read.file(f"1 300 100 300\n1 100\n{rows}" + "".join(f"{a} {b} -{c}\n" for a, b, c in mesh.faces + 1), "mesh.g")
+        read.file(byu(loose_triangles(100)), "mesh.g")
         assert fault(lambda: read.scene(text, Limits(mesh_work=1000))).code == "GEO273"
         assert read.scene(text).model.ngeom > 1
 
@@ -166,7 +229,6 @@ class TestWork:
 
 
 NODES = "#####GRAPHSTART#####\n2 0 2\n0 0 0 0 0\n1 0 0 0 0\n#####GRAPHSTOP#####\n"
-ROBOT = "Active\n1\ncube.g Planar Rotational\nConnections\n0\n"
 
 
 def rows_of(text: str, limits: Limits) -> None:
@@ -196,14 +258,19 @@ PASSED: dict[str, tuple[str, Callable[[Reader, Limits], object]]] = {
     "polygon_work": ("GEO270", lambda r, x: r.mesh(star(20), x)),
     "scene_elements": ("GEO271", lambda r, x: r.scene(BOX + "1\n" + ROBOT, x)),
     "scene_cells": ("GEO272", lambda r, x: r.scene(BOX + "2\nPassive\ncube.g 0 0 0 0 0 0\n" + ROBOT, x)),
+    "mesh_work": ("GEO273", lambda r, x: r.scene(BOX + "1\nPassive\nloose.g 0 0 0 0 0 0\n", x)),
     "pairs": ("GEO275", lambda r, x: r.scene(BOX + "3\n" + "Passive\ncube.g 9 9 9 0 0 0\n" * 2 + ROBOT, x)),
 }  # fmt: skip
 
 
 class TestLimits:
+    def test_each_is_passed(self) -> None:
+        assert set(PASSED) == {f.name for f in fields(Limits)}
+
     @pytest.mark.parametrize("name", PASSED)
     def test_each_has_a_diagnostic_that_names_its_option(self, read: Reader, name: str) -> None:
         read.file(CUBE, "cube.g")
+        read.file(byu(loose_triangles(4)), "loose.g")
         code, run = PASSED[name]
         found = fault(lambda: run(read, Limits(**{name: 1})))
         assert found.code == code
@@ -234,9 +301,10 @@ import numpy as np
 from env2mjcf.errors import DiagnosticLog, Env2MjcfError
 from env2mjcf.options import Limits
 import env2mjcf
-from env2mjcf.cli.rows import _numpy_array
+from env2mjcf.formats.arrays import map_array
 from env2mjcf.formats.byu import read_byu
 from env2mjcf.formats.gms import read_gms
+from env2mjcf.formats.lexer import parse_integer
 from env2mjcf.formats.obj import read_obj
 from env2mjcf.formats.path import read_path
 from env2mjcf.formats.roadmap import read_roadmap
@@ -256,7 +324,7 @@ for n in (10**8, 10**12, 10**14):
         lambda: read_roadmap(source(f"#####GRAPHSTART#####\\n{{n}} {{n}} {{n}}\\n0 0 0 0 {{n}}\\n"), (3,), log),
         lambda: env2mjcf.read(sys.argv[1] + f"/bodies{{n}}.env", limits=unlimited),
         lambda: env2mjcf.read(sys.argv[1] + f"/links{{n}}.env", limits=unlimited),
-        lambda: _numpy_array(sys.argv[1] + f"/rows{{n}}.npy"),
+        lambda: map_array(sys.argv[1] + f"/rows{{n}}.npy", log),
     ):
         try:
             run()
@@ -324,6 +392,33 @@ def _sized(size: str) -> str:
     )
 
 
+class TestIntegers:
+    """Leading zeros do not make a number large, however many Python would take."""
+
+    ZEROS = "0" * 5000
+
+    def test_of_counts_and_indices(self, read: Reader) -> None:
+        joined = f"{self.ZEROS} {self.ZEROS}1 NonActuated\n{'0 ' * 6}\n{'0 ' * 4}\n{'0 ' * 6}\n"
+        arm = f"Active\n2\nx.g Fixed 0 0 0 0 0 0\nx.g Joint\nConnections\n1\n{joined}"
+        (robot,) = read.env(BOX + f"{self.ZEROS}1\n{arm}").robots
+        assert (robot.connections[0].previous, robot.connections[0].next) == (0, 1)
+
+    @pytest.mark.parametrize("digits", [ZEROS + "61300", "1" * 5000])
+    def test_of_versions(self, digits: str) -> None:
+        text = f"Roadmap Version Number {digits}\n{NODES}"
+        assert read_roadmap(Source.of("x.map", text), (3,), DiagnosticLog()).header.version == digits
+
+    @pytest.mark.parametrize("digits", ["1" * 400, "-" + "1" * 5000])
+    def test_what_is_too_large_is_refused(self, read: Reader, digits: str) -> None:
+        assert fault(lambda: read.env(BOX + f"{digits}\n")).code == "ENV113"
+
+    @pytest.mark.parametrize(
+        ("word", "value"), [("+7", 7), ("-0012", -12), ("000", 0), ("9007199254740993", 2**53 + 1)]
+    )
+    def test_each_digit_counts(self, word: str, value: int) -> None:
+        assert parse_integer(word) == value
+
+
 class TestEncodings:
     @pytest.mark.parametrize("name", ["mesh.g", "mesh.obj", "mesh.dat"])
     @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-le", "utf-32-be"])
@@ -363,28 +458,94 @@ class TestPlaces:
         assert line[carets.index("^")] == "7"
         assert len(line) < 500
 
-
-class TestArrays:
-    @staticmethod
-    def of(read: Reader, content: bytes) -> Env2MjcfError:
-        from env2mjcf.cli.configurations import of_file
-
+    @pytest.mark.parametrize(("row", "word"), [("1.5 0 .", "."), ("-5 0 -", "-"), ("0, 1x,1", "1x")])
+    def test_of_a_word_that_another_one_holds(self, read: Reader, row: str, word: str) -> None:
         read.file(CUBE, "cube.g")
         scene = read.scene(BOX + "1\n" + ROBOT)
-        path = read.file(content, "rows.npy")
-        return fault(lambda: of_file(scene, str(path), False, Limits(), DiagnosticLog()))
+        path = str(read.file(f"0 0 0\n{row}\n", "rows.csv"))
+        found = fault(lambda: of_file(scene, path, False, Limits(), DiagnosticLog()))
+        assert found.span is not None
+        assert (found.span.line, found.span.column) == (2, row.rindex(word) + 1)
 
-    def test_a_damaged_archive_is_no_array(self, read: Reader) -> None:
-        assert self.of(read, b"PK\x03\x04" + b"0" * 100).code == "CFG505"
 
-    def test_neither_is_a_whole_one(self, read: Reader) -> None:
-        file = io.BytesIO()
-        with zipfile.ZipFile(file, "w") as archive:
-            archive.writestr("a.npy", b"")
-        assert self.of(read, file.getvalue()).code == "CFG505"
+def npy(array: np.ndarray, version: tuple[int, int] = (1, 0)) -> bytes:
+    file = io.BytesIO()
+    np.lib.format.write_array(file, array, version)
+    return file.getvalue()
 
-    @pytest.mark.filterwarnings("error")
-    def test_numbers_that_would_overflow_are_refused(self, read: Reader) -> None:
-        file = io.BytesIO()
-        np.save(file, np.full((1, 3), 1e308))
-        assert self.of(read, file.getvalue()).code == "CFG505"
+
+def npy_of(shape: str) -> bytes:
+    """An array whose header says this, and which holds next to nothing."""
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}\n".encode()
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + b"0" * 48
+
+
+def zipped() -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("a.npy", b"")
+    return file.getvalue()
+
+
+def checked(scene: env2mjcf.Scene, path: str) -> np.ndarray:
+    return of_file(scene, path, False, Limits(), DiagnosticLog()).q
+
+
+def batched(scene: env2mjcf.Scene, path: str) -> np.ndarray:
+    source = open_source(path, scene.space, True)
+    return source.decoded(source.raw(0, len(source)), 0)
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize("verb", [checked, batched])
+class TestArrays:
+    REFUSED: ClassVar[dict[str, bytes]] = {
+        "a damaged archive": b"PK\x03\x04" + b"0" * 100,
+        "a whole archive": zipped(),
+        "an empty file": b"",
+        "more rows than there are numbers": npy_of(f"({10**30}, 3)"),
+        "no row of more numbers than there are": npy_of(f"(0, {10**30})"),
+        "as many rows as an index holds": npy_of(f"({2**62}, 3)"),
+        "fewer rows than none": npy_of("(-1, 3)"),
+        "a header as deep as long": npy_of(f"({'-' * 9000}1, 3)"),
+        "words": npy(np.full((1, 3), "a")),
+        "truths": npy(np.full((1, 3), True)),
+        "complex numbers": npy(np.full((1, 3), 1j)),
+        "nan": npy(np.full((1, 3), np.nan)),
+        "1e150": npy(np.full((1, 3), 1e150)),
+        "1e308": npy(np.full((1, 3), 1e308)),
+        "what no double holds": npy(np.full((1, 3), np.finfo(np.longdouble).max)),
+        "four numbers": npy(np.zeros((1, 5))),
+    }
+    READ: ClassVar[dict[str, bytes]] = {
+        "version 1.0": npy(np.ones((2, 3))),
+        "version 2.0": npy(np.ones((2, 3)), (2, 0)),
+        "version 3.0": npy(np.ones((2, 3)), (3, 0)),
+        "integers": npy(np.ones((2, 3), dtype=np.uint8)),
+        "long doubles": npy(np.ones((2, 3), dtype=np.longdouble)),
+        "the other byte order": npy(np.ones((2, 3), dtype=">f4")),
+        "column by column": npy(np.ones((2, 3), order="F")),
+    }
+
+    @pytest.fixture
+    def scene(self, read: Reader) -> env2mjcf.Scene:
+        read.file(CUBE, "cube.g")
+        return read.scene(BOX + "1\n" + ROBOT)
+
+    @pytest.mark.parametrize("content", REFUSED)
+    def test_what_is_no_rows_is_refused(self, read, scene, verb, content, recwarn) -> None:
+        path = str(read.file(self.REFUSED[content], "rows.npy"))
+        assert fault(lambda: verb(scene, path)).code in ("CFG504", "CFG505")
+        assert not list(recwarn)
+
+    @pytest.mark.parametrize("content", READ)
+    def test_rows_are_read(self, read, scene, verb, content) -> None:
+        path = str(read.file(self.READ[content], "rows.npy"))
+        np.testing.assert_array_equal(verb(scene, path), scene.space.decode(np.ones((2, 3))))
+
+    def test_the_row_that_is_too_large_is_named(self, read, scene, verb) -> None:
+        rows = np.zeros((5, 3))
+        rows[3, 1] = -1e101
+        path = str(read.file(npy(rows), "rows.npy"))
+        found = fault(lambda: verb(scene, path)).diagnostic.message
+        assert f"row 3 of {path}: {scene.space.names[1]} is -1e+101" in found

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
+import select
+import socket
 import subprocess
 import sys
 import unicodedata
@@ -303,6 +305,25 @@ def test_nothing_outside_the_folder_is_opened(name: str, place: str, tmp_path: P
         env2mjcf.load(scene, engine="mujoco", cache=False, **options)
     assert opened == []
     assert caught.value.code in ("GEO201", "GEO202", "GEO203", "ENV101", "ENV104", "ENV150")
+
+
+@pytest.mark.parametrize("kind", ["SYSTEM", 'PUBLIC "e"'])
+@pytest.mark.parametrize("there", ["http://127.0.0.1:{port}/e.dtd", "{folder}/e.dtd", "../e.dtd"])
+def test_a_document_type_elsewhere_is_not_fetched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, there: str
+) -> None:
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    (tmp_path / "e.dtd").write_text("<!this is not well-formed")
+    # No audit hook sees what a library in C opens: a server does, and so does what would break the document.
+    with socket.create_server(("127.0.0.1", 0)) as server, watching(tmp_path, here) as opened:
+        place = there.format(port=server.getsockname()[1], folder=tmp_path)
+        scene = here / "scene.xml"
+        scene.write_text(f'<!DOCTYPE Environment {kind} "{place}">\n<Environment/>')
+        assert env2mjcf.read(scene).multibodies == ()
+        assert select.select([server], [], [], 0)[0] == []
+    assert opened == []
 
 
 class watching:

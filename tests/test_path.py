@@ -55,6 +55,10 @@ def test_a_row_of_all_robots_stands_behind_a_zero_or_not() -> None:
     assert rows(f"{HEAD}2012\n1\n1\n1 2 3 4 5 6\n", 3, 3) == [(ALL_ROBOTS, (1, 2, 3, 4, 5, 6))]
 
 
+def test_a_row_of_robots_that_cannot_move_is_an_index_alone() -> None:
+    assert rows(f"{HEAD}2012\n1\n2\n0\n0\n", 0, 0) == [(ALL_ROBOTS, ())] * 2
+
+
 def test_the_oldest_version_holds_a_pose_for_every_link() -> None:
     poses = "\n".join(f"{i} 0 0 0.25 -0.5 0" for i in range(6))
     found, diagnostics = read(f"{HEAD}20001022\n3\n2\n{poses}\n", 8, links=(3,))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from math import pi
 from pathlib import Path
@@ -411,6 +412,17 @@ def test_a_link_that_leads_outside_is_outside(problem: Reader, tmp_path: Path) -
     assert fault(env2mjcf.read, str(path)).code == "ENV150"
 
 
+@pytest.mark.parametrize("name", ["ignoreIAdjacentLinks", "ignore_i_adjacent_links"])
+def test_fewer_links_than_none_are_refused(problem: Reader, name: str) -> None:
+    found = fault(problem, PROBLEM.replace('ignoreAdjacentLinks="true"', f'{name}="-5"'))
+    assert (found.code, found.span and found.span.text[found.span.column - 1 :][:2]) == ("ENV110", "-5")
+
+
+def test_leading_zeros_do_not_make_a_number_large(problem: Reader) -> None:
+    scene = problem(PROBLEM.replace('ignoreAdjacentLinks="true"', f'ignoreIAdjacentLinks="{"0" * 5000}2"'))
+    assert scene.planner_rules.adjacent_links == 2
+
+
 # The text itself.
 
 
@@ -419,6 +431,68 @@ def test_entities_are_refused(read: Reader, declaration: str) -> None:
     text = XML_ENVIRONMENT.replace("<Environment", f"<!DOCTYPE e [{declaration}]>\n<Environment", 1)
     found = fault(read, text)
     assert (found.code, found.span and found.span.line) == ("ENV144", 2)
+
+
+HIDDEN = [
+    "<!DOCTYPE e SYSTEM '<!--' [{}]><!-- -->",
+    "<!DOCTYPE e [<!ATTLIST e a CDATA '<!--'>{}]><!-- -->",
+    "<!-- -->\n<!DOCTYPE e [{}]>",
+]
+
+
+@pytest.mark.parametrize("prolog", HIDDEN)
+def test_entities_are_not_hidden_by_what_only_looks_like_a_comment(read: Reader, prolog: str) -> None:
+    declared = prolog.format('<!ENTITY a "b">')
+    assert fault(read, XML_ENVIRONMENT.replace("<Environment", f"{declared}<Environment", 1)).code == "ENV144"
+
+
+@pytest.mark.parametrize("where", ["<Environment", "</Environment>"])
+@pytest.mark.parametrize("harmless", ["<!-- <!ENTITY x 'y'> \" &foo; -->", "<?note <!ENTITY x 'y'> ' &foo;?>"])
+def test_comments_declare_and_name_nothing(read: Reader, where: str, harmless: str) -> None:
+    assert not codes(read(XML_ENVIRONMENT.replace(where, f"{harmless}\n{where}", 1)))
+
+
+@pytest.mark.parametrize("prolog", ["", '<!DOCTYPE e SYSTEM "e.dtd">', '<!DOCTYPE e SYSTEM "<!--">'])
+def test_an_entity_that_a_text_names_is_refused_where_it_stands(read: Reader, prolog: str) -> None:
+    text = XML_ENVIRONMENT.replace("<Environment", f"{prolog}<Environment", 1).replace("table.g", "a&foo;b", 1)
+    found = fault(read, text)
+    assert (found.code, found.span and found.span.line) == ("ENV144", text[: text.index("&foo;")].count("\n") + 1)
+    assert found.span is not None
+    assert found.span.text[found.span.column - 1 :].startswith("&foo;")
+    assert "'&foo;'" in found.message
+
+
+def test_the_first_fault_is_told(read: Reader) -> None:
+    found = fault(read, "<Environment>\n<a></b>\n<c d='&foo;'/>\n</Environment>")
+    assert (found.code, found.span and found.span.line) == ("ENV140", 2)
+    found = fault(read, "<Environment>\n<c d='&foo;'/>\n<a></b>\n</Environment>")
+    assert (found.code, found.span and found.span.line) == ("ENV144", 2)
+
+
+def test_characters_may_be_written_as_references(read: Reader) -> None:
+    plain = read(XML_ENVIRONMENT).multibodies
+    digits = [m.start(1) for m in re.finditer(r'transform="([0-9])', XML_ENVIRONMENT)]
+    assert digits
+    text = XML_ENVIRONMENT
+    for at in reversed(digits):
+        text = f"{text[:at]}&#{ord(text[at])};{text[at + 1 :]}"
+    named = read(text).multibodies
+    assert [b.pose for m in named for b in m.bodies] == [b.pose for m in plain for b in m.bodies]
+
+
+def test_what_is_wrong_with_them_has_the_place_of_the_attribute(read: Reader) -> None:
+    text = re.sub(r'transform="[^"]*"', 'transform="&#48; wrong 0 0 0 0"', XML_ENVIRONMENT, count=1)
+    found = fault(read, text)
+    at = text.index("&#48;")
+    assert found.code == "ENV112"
+    assert "'wrong'" in found.message
+    assert found.span is not None
+    assert (found.span.line, found.span.column) == (text[:at].count("\n") + 1, at - text.rindex("\n", 0, at))
+
+
+@pytest.mark.parametrize("text", ["<Environment>{}</Environment>", "<Environment a='{}'/>", "<!--{}--><Environment/>"])
+def test_texts_that_no_scene_has_are_called_so(read: Reader, text: str) -> None:
+    assert fault(read, text.format("x" * 10_500_000)).code == "ENV181"
 
 
 def test_a_document_type_alone_is_no_fault(read: Reader) -> None:

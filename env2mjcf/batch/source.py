@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
+from ..formats.arrays import coordinates, map_array
 from ..space import ConfigurationSpace
 from ..transforms import Array
 
@@ -47,18 +48,12 @@ class Source:
             start: Number of the first.
 
         Raises:
-            FormatError: A number is not finite.
+            FormatError: A number is not finite, or too large.
         """
-        rows = raw.astype(np.float64)
-        finite = np.isfinite(rows)
-        if not finite.all():
-            row, column = (int(i) for i in np.argwhere(~finite)[0])
-            DiagnosticLog().fail(
-                FormatError, "CFG505", self.path,
-                f"row {start + row} of {self.path}: {self.space.names[column]} is {rows[row, column]}; "
-                "expected a finite number",
-                hint="mend the row and run the same command again: what lies before it is kept",
-            )  # fmt: skip
+        rows = coordinates(
+            raw, self.path, DiagnosticLog(), names=self.space.names, first=start,
+            hint="mend the row and run the same command again: what lies before it is kept",
+        )  # fmt: skip
         return self.space.decode(rows) if self.file_units else rows
 
 
@@ -72,14 +67,7 @@ def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Sourc
     if not Path(path).is_file():
         what = "is a folder" if Path(path).is_dir() else "does not exist"
         log.fail(FormatError, "CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
-    try:
-        rows: Any = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError, SyntaxError, TypeError) as error:
-        log.fail(FormatError, "CFG505", path, f"{path} is no NumPy file (.npy), or cut off: {error}", hint=hint)
-    if not isinstance(rows, np.ndarray):
-        log.fail(FormatError, "CFG505", path, f"{path} is an archive of arrays (.npz); expected one array", hint=hint)
-    if rows.dtype.kind not in "fiu":
-        log.fail(FormatError, "CFG505", path, f"{path} holds {rows.dtype} values; expected floats", hint=hint)
+    rows = map_array(path, log, hint)
     if rows.ndim != 2 or rows.shape[1] != space.dim:
         names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
         if rows.shape == (space.dim,):

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
-from ..formats.rows import LARGEST, check_rows, coordinate, coordinate_hint, split_row
+from ..formats.arrays import coordinates, map_array
+from ..formats.rows import check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
 from ..options import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
 from ..transforms import Array
+
+_WORD = re.compile(r"[^,;\s]+")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,15 +117,12 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     """
     if not os.path.isfile(path) or os.path.getsize(path) > limits.file_bytes:
         read_source(path, log, limits)  # says what is wrong
-    try:
-        array = _numpy_array(path)
-    except Exception:  # NumPy's reader raises whatever it stumbles over
-        log.fail(FormatError, "CFG505", path, f"{path} is no NumPy file with an array of numbers")
+    array = map_array(path, log)
     rows = np.atleast_2d(array)
-    if rows.ndim != 2 or not rows.size or not (np.abs(rows) <= LARGEST).all():
-        shape = rows.ndim != 2 or not rows.size
-        what = f"an array of shape {array.shape}" if shape else "numbers that are not finite, or too large"
-        log.fail(FormatError, "CFG505", path, f"{path} holds {what}; expected finite rows of {expected(scene)}")
+    if rows.ndim != 2 or not rows.size:
+        what = f"an array of shape {array.shape}"
+        log.fail(FormatError, "CFG505", path, f"{path} holds {what}; expected rows of {expected(scene)}")
+    rows = coordinates(rows, path, log, names=scene.space.names)
     if rows.shape[1] == scene.space.dim:
         q = rows if radians else scene.space.decode(rows)
         return Configurations(q, tuple(f"row {i}" for i in range(len(rows))))
@@ -137,24 +135,6 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     return joined(scene, found)
 
 
-def _numpy_array(path: str) -> Array:
-    """Read a NumPy file whose content is as long as its header says: one that declares more allocates nothing.
-
-    Raises:
-        Exception: It is none; of whatever kind.
-    """
-    with open(path, "rb") as file:
-        version = np.lib.format.read_magic(file)
-        header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-        shape, _, dtype = header[version](file)
-        length = os.path.getsize(path) - file.tell()
-        if dtype.kind not in "biuf" or min(shape, default=1) < 0 or math.prod(shape) * dtype.itemsize > length:
-            raise ValueError(f"{dtype} of shape {shape} in {length} bytes")
-        file.seek(0)
-        array: Any = np.load(file, allow_pickle=False)
-    return np.asarray(array, dtype=np.float64)
-
-
 def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> Configurations:
     """Read a text of rows, numbers between commas or blanks; a first line without numbers names columns.
 
@@ -162,17 +142,16 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
         FormatError: A word is no finite number, or a row fits no robot.
     """
     found: list[tuple[str, Array]] = []
-    lines = enumerate(re.split(r"\r\n?|\n", source.text), 1)
-    rows = ((line, _words(content)) for line, content in lines)
-    for n, (line, words) in enumerate((line, words) for line, words in rows if words):
-        numbers = [coordinate(w) for w in words]
-        if n == 0 and not any(_looks_like_a_number(w) for w in words):
+    rows = ((line, start, _words(text)) for line, (start, text) in enumerate(source.lines(), 1))
+    for n, (line, start, words) in enumerate(row for row in rows if row[2]):
+        numbers = [coordinate(w.group()) for w in words]
+        if n == 0 and not any(_looks_like_a_number(w.group()) for w in words):
             continue  # names of columns
         wrong = next((w for w, x in zip(words, numbers, strict=True) if x is None), None)
         if wrong is not None:
             log.fail(
-                FormatError, "CFG502", source.path, f"expected a row of finite numbers, found {wrong[:60]!r}",
-                hint=coordinate_hint(wrong), span=source.line_span(line, wrong),
+                FormatError, "CFG502", source.path, f"expected a row of finite numbers, found {wrong.group()[:60]!r}",
+                hint=coordinate_hint(wrong.group()), span=source.span(start + wrong.start(), start + wrong.end()),
             )  # fmt: skip
         row = row_of(scene, [x for x in numbers if x is not None], radians)
         if row is None:
@@ -190,8 +169,8 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
     return joined(scene, found)
 
 
-def _words(line: str) -> list[str]:
-    return [w for w in re.split(r"[,;\s]+", line.split("#", maxsplit=1)[0]) if w]
+def _words(line: str) -> list[re.Match[str]]:
+    return list(_WORD.finditer(line.split("#", maxsplit=1)[0]))
 
 
 def _looks_like_a_number(word: str) -> bool:

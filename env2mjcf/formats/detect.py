@@ -14,7 +14,8 @@ _COUNT = re.compile(r"[0-9]+")
 # Every tag is at most this long, so that a longer word need not be compared with them.
 _LONGEST_TAG = 16
 _TAG_LIKE = re.compile(rf"(?<!\S)[AaNnSs][A-Za-z]{{3,{_LONGEST_TAG}}}(?!\S)")
-_OPTION = re.compile(r"-[A-Za-z]\([^)\r\n]*\)")
+# One that is not closed reaches to the end of its line: those behind it are not tried each.
+_OPTION = re.compile(r"-[A-Za-z]\([^)\r\n]*\)?")
 _BOUNDARY = re.compile(r"\s*\S+\s+(?:[A-Za-z]\w*\s*)?(\[)?")
 _LIMITS = re.compile(r"\b(revolute|spherical)\s+[^\s:]+:", re.IGNORECASE)
 _ROBOT_TAGS = ("Active", "NonHolonomic", "Surface")

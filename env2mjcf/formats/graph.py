@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import NoReturn
 
 from ..errors import DiagnosticLog, FormatError
+from .lexer import parse_integer
 from .rows import check_rows, coordinate, coordinate_hint
 from .source import Source
 
@@ -156,7 +157,7 @@ def _layouts(version: str, robots: int) -> Iterator[_Layout]:
     infos = [0, 2, _MODERN_INFO]
     forms = [EdgeForm.INTERMEDIATES, EdgeForm.CONTROLS, EdgeForm.PLANNER, EdgeForm.WEIGHT]
     if version:
-        infos.sort(key=lambda n: n != _expected_info(int(version) if version.isdecimal() else 0))
+        infos.sort(key=lambda n: n != _expected_info(parse_integer(version) or 0))
         forms = [EdgeForm.PLANNER, EdgeForm.WEIGHT, EdgeForm.INTERMEDIATES]
     indices = (True, False) if robots > 1 else (False, True)
     moving = [] if version else [(True, 0)]
@@ -183,7 +184,7 @@ class _Reading:
 
     def __init__(self, source: Source, words: Sequence[_Word], layout: _Layout, dofs: Sequence[int]) -> None:
         self._source, self._words, self._layout, self._dofs = source, words, layout, dofs
-        self._at = 0
+        self._at = self._intermediates = 0
         self.aligned = True
         self.understood = 0
 
@@ -221,7 +222,9 @@ class _Reading:
             planner = self._whole("the index of a local planner", least=-1)
             return Edge(target, self._number("the weight of an edge"), planner)
         count = self._whole("the number of intermediate configurations of an edge")
-        if count > len(self._words) - self._at:
+        # Counted over all edges: those of a robot without degrees of freedom are made of no words.
+        self._intermediates += count
+        if self._intermediates > len(self._words):
             raise _Misfit(len(self._words), f"{count} intermediate configurations")
         between = tuple(self._configuration()[1] for _ in range(count))
         weight = self._number("the weight of an edge")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
@@ -19,7 +19,8 @@ T = TypeVar("T")
 # What C++ stream extraction accepts: no nan, inf or hexadecimal (env-format section 3.2). A number may be followed
 # by a comment, but 1.#INF is how some C++ libraries print infinity.
 _END = r"(?=[\s;:()\[\]]|#(?!INF|IND|QNAN|SNAN)|\Z)"
-_NUMBER = re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?{_END}")
+# Digits belong to one part of the pattern only: else a long run of them is split in every way before it is no number.
+_NUMBER = re.compile(rf"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?{_END}")
 _INTEGER = re.compile(rf"[+-]?[0-9]+{_END}")
 _WORD = re.compile(r"[^\s;\[\]]+")
 _CHUNK = re.compile(r"\S+")
@@ -37,6 +38,15 @@ def parse_number(word: str) -> float | None:
         return None
     value = float(word)
     return value if math.isfinite(value) else None
+
+
+def parse_integer(word: str) -> int | None:
+    """Return the integer that a word is; None where it is none, or too large for a number."""
+    if not _INTEGER.fullmatch(word) or math.isinf(float(word)):
+        return None
+    # Python counts leading zeros among the digits of which it takes so many only.
+    size = int(word.lstrip("+-").lstrip("0") or "0")
+    return -size if word.startswith("-") else size
 
 
 def number_hint(word: str) -> str:
@@ -66,7 +76,6 @@ class Scanner:
     Args:
         source: The text.
         log: Where findings go.
-        limits: Bounds on hostile input.
         start, end: The part of the text to read; all of it by default.
         part: What that part is called in messages.
     """
@@ -75,14 +84,13 @@ class Scanner:
         self,
         source: Source,
         log: DiagnosticLog,
-        limits: Limits,
         start: int = 0,
         end: int | None = None,
         part: str = "file",
     ) -> None:
         self.source = source
         self.log = log
-        self.limits = limits
+        self.limits = source.limits
         self.comments: list[Comment] = []
         self._part = part
         self._start = start
@@ -152,7 +160,7 @@ class Scanner:
 
     def number(self, what: str) -> float:
         """Read a finite number."""
-        return float(self._numeral(_NUMBER, what, "a number"))
+        return self._numeral(_NUMBER, parse_number, f"a number ({what})", what)
 
     def numbers(self, names: str) -> tuple[float, ...]:
         """Read one number for each blank-separated name."""
@@ -160,7 +168,7 @@ class Scanner:
 
     def integer(self, what: str) -> int:
         """Read an integer."""
-        return int(self._numeral(_INTEGER, what, "an integer"))
+        return self._numeral(_INTEGER, parse_integer, f"an integer ({what})", what)
 
     def count(self, what: str, at_most: int, limit: str) -> int:
         """Read a count that is neither negative nor beyond a limit, one of the fields of `Limits`."""
@@ -217,7 +225,7 @@ class Scanner:
         """Return a scanner over the rest of the current line, and step behind its end."""
         match = _REST_OF_LINE.match(self.source.text, self._position, self._end)
         assert match is not None
-        rest = Scanner(self.source, self.log, self.limits, match.start(), match.end(1), part="line")
+        rest = Scanner(self.source, self.log, match.start(), match.end(1), part="line")
         rest.comments = self.comments
         self._position = match.end()
         return rest
@@ -245,15 +253,16 @@ class Scanner:
         code = "ENV113" if _NOT_FINITE.match(found) else "ENV112"
         self.fail(code, f"expected {what}, found {found!r}", hint=hint or f"write {what} here")
 
-    def _numeral(self, pattern: re.Pattern[str], what: str, kind: str) -> str:
+    def _numeral(self, pattern: re.Pattern[str], parse: Callable[[str], T | None], expected: str, what: str) -> T:
         match = self.next_matches(pattern)
         if match is None:
-            self.fail_expected(f"{kind} ({what})")
-        if math.isinf(float(match.group())):
+            self.fail_expected(expected)
+        value = parse(match.group())
+        if value is None:
             found = _shortened(match.group())
             self.fail("ENV113", f"{what} {found} is too large for a number", hint="numbers must be finite")
         self._position = match.end()
-        return match.group()
+        return value
 
     def _skip(self) -> None:
         text, end = self.source.text, self._end

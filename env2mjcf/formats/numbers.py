@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..errors import Span
 from .source import DOTS, quoted
 
-_NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
-_FIELD = re.compile(rb" *[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_FIELD = re.compile(rb" *[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?")
 _POINT = re.compile(rb"[.eEdD]")
 _D_TO_E = bytes.maketrans(b"dD", b"eE")
 _LINE = re.compile(rb"[^\r\n]+")

@@ -215,7 +215,11 @@ def _configurations(
         rows = [fitting(source, line, dofs, log, "path") for line in lines]
     else:
         total = sum(dofs)
-        rows = [Row(ALL_ROBOTS, line.numbers[-total:], len(line.numbers) > total, Extra.NOTHING) for line in lines]
+        behind_index = [line.numbers[len(line.numbers) - total :] for line in lines]
+        rows = [
+            Row(ALL_ROBOTS, numbers, len(line.numbers) > total, Extra.NOTHING)
+            for line, numbers in zip(lines, behind_index, strict=True)
+        ]
     judge_rows(source, zip(rows, (line.span for line in lines), strict=True), log)
     return PathFile(head.version, tuple(rows), None, tuple(line.span.line for line in lines))
 

@@ -149,7 +149,7 @@ def _read_rules(root: Node) -> PlannerRules:
     checkers = list(root.descendants("CollisionDetection"))
     self_flags = [v for c in checkers if (v := _flag(c, "ignoreSelfCollision")) is not None]
     adjacent = [int(v) for c in checkers if (v := _flag(c, "ignoreAdjacentLinks")) is not None]
-    adjacent += [c.integer(name) for c in checkers for name in _ADJACENT_LINKS if c.get(name) is not None]
+    adjacent += [_read_links(c, name) for c in checkers for name in _ADJACENT_LINKS if c.get(name) is not None]
     rules = PlannerRules(any(self_flags) if self_flags else None, max(adjacent) if adjacent else None)
     if rules != PlannerRules():
         root.log.info(
@@ -160,6 +160,16 @@ def _read_rules(root: Node) -> PlannerRules:
             span=checkers[0].span,
         )  # fmt: skip
     return rules
+
+
+def _read_links(node: Node, name: str) -> int:
+    number = node.integer(name)
+    if number < 0:
+        node.fail(
+            "ENV110", f"{name} is {number}; expected 0 or more", hint="links within so many connections are not tested",
+            at=name,
+        )  # fmt: skip
+    return number
 
 
 def _flag(node: Node, name: str) -> bool | None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 
-from ..errors import DiagnosticLog, FormatError
+from ..errors import DiagnosticLog, FormatError, Span
 from ..model import Task
-from .rows import fitting, judge_rows, number_lines, regrouped, row_text
+from .rows import Row, fitting, judge_rows, number_lines, regrouped, row_text
 from .source import Source
 
 
@@ -41,10 +42,14 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
             hint="is the file cut off?", span=rows[0][1],
         )  # fmt: skip
     tasks: list[Task] = []
-    for robot in sorted({row.robot for row, _ in rows}):
-        own = [(row, span) for row, span in rows if row.robot == robot]
+    for robot, group in groupby(sorted(rows, key=_robot), _robot):
+        own = list(group)
         tasks.append(Task(robot, tuple(row.configuration for row, _ in own), span=own[0][1]))
     return tuple(tasks)
+
+
+def _robot(placed: tuple[Row, Span]) -> int:
+    return placed[0].robot
 
 
 def query_text(tasks: Iterable[Task], *, index: bool) -> str:

@@ -21,7 +21,8 @@ from .query import read_query
 from .robot import read_robot
 from .rows import split_row
 from .source import Source, read_source
-from .xml import Node, parse_xml
+from .xml import Node
+from .xml_parsing import parse_xml
 
 _PROBLEM_TAGS = ("motionplanning", "motion_planning", "mpproblem", "problem")
 
@@ -53,7 +54,7 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
     source = read_source(path, log, options.limits)
     problem: Problem | None = None
     if is_xml(source):
-        root = parse_xml(source, log, options.limits)
+        root = parse_xml(source, log)
         if root.tag.lower() in _PROBLEM_TAGS:
             problem = read_problem(root)
             environment = _problem_environment(problem, source, options, log)
@@ -92,7 +93,7 @@ def robot_dofs(environment: Environment, log: DiagnosticLog) -> list[int]:
 def _text_environment(source: Source, options: Options, log: DiagnosticLog) -> Environment:
     dialect = Dialect(options.dialect) if options.dialect else detect(source, log)
     _check_semantics(source, dialect, options)
-    return read_env(Scanner(source, log, options.limits), dialect, options.semantics)
+    return read_env(Scanner(source, log), dialect, options.semantics)
 
 
 def _check_semantics(source: Source, dialect: Dialect, options: Options) -> None:
@@ -139,7 +140,7 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
     else:
         inner = _read_beside(source, problem.filename, node, options, log)
         if is_xml(inner):
-            environment = _xml_environment(parse_xml(inner, log, options.limits), options)
+            environment = _xml_environment(parse_xml(inner, log), options)
         else:
             environment = _text_environment(inner, options, log)
         environment = xml_scene.with_environment_attributes(environment, node)
@@ -155,8 +156,8 @@ def _problem_robot(robot: ProblemRobot, source: Source, options: Options, log: D
 
 def _robot_file(source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
     if not is_xml(source):
-        return read_robot(Scanner(source, log, options.limits))
-    root = parse_xml(source, log, options.limits)
+        return read_robot(Scanner(source, log))
+    root = parse_xml(source, log)
     if root.tag.lower() != "robot":
         root.fail("ENV130", f"unknown root <{root.tag}>; expected <Robot>", hint="name a robot file")
     return xml_scene.read_robot(root)

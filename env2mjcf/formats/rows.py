@@ -131,7 +131,8 @@ def check_rows(source: Source, count: int, log: DiagnosticLog, span: Span) -> No
 
 
 def _extra(width: int, dof: int, *, legacy: bool) -> Extra | None:
-    known = {dof: Extra.NOTHING, 2 * dof: Extra.VELOCITIES}
+    # Nothing behind a robot without degrees of freedom is nothing, not its velocities.
+    known = {2 * dof: Extra.VELOCITIES, dof: Extra.NOTHING}
     if legacy:
         known.setdefault(dof + _LEGACY_INFO_FIELDS, Extra.INFO_FIELDS)
     return known.get(width)

@@ -37,17 +37,19 @@ class Source:
         path: The file, as it was named by the caller.
         text: The whole text, without a byte order mark; line ends as in the file.
         limits: What may be in it.
+        place: Where all of it stands, if it is no text of a file but what one means; no part has a place of its own.
     """
 
     path: str
     text: str
     limits: Limits = field(default_factory=Limits, repr=False, compare=False)
+    place: Span | None = None
     _starts: tuple[int, ...] = field(default=(0,), repr=False, compare=False)
 
     @classmethod
     def of(cls, path: str, text: str, limits: Limits | None = None) -> Source:
         """Index the lines of a text; a line feed, a carriage return or both end a line."""
-        return cls(path, text, limits or Limits(), (0, *(m.end() for m in _LINE_END.finditer(text))))
+        return cls(path, text, limits or Limits(), None, (0, *(m.end() for m in _LINE_END.finditer(text))))
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Iterate the lines: where each starts in the text, and what it says without its line end."""
@@ -56,6 +58,8 @@ class Source:
 
     def span(self, start: int, end: int | None = None) -> Span:
         """Return the place of `text[start:end]`, cut at the end of its first line."""
+        if self.place is not None:
+            return self.place
         row = bisect.bisect_right(self._starts, start) - 1
         begin, stop = self._starts[row], self._line_end(row)
         start = min(start, stop)

@@ -1,50 +1,33 @@
-"""XML, read without entities, network or huge trees, with the place of every attribute."""
+"""The elements of an XML file, with the place of every attribute."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn, TypeVar
 
-from lxml import etree
-
 from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
-from ..options import Limits
 from .lexer import Scanner
 from .source import Source
 
 T = TypeVar("T")
 
-# lxml keeps only the line where a start tag ends; the n-th start tag of the text is the n-th element.
-_MARKUP = re.compile(
-    r"<!--.*?-->|<\?.*?\?>|<!\[CDATA\[.*?\]\]>|<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>"
-    r"|<(?P<tag>[^\s/>!?\"'=]+)(?:[^\"'<>]|\"[^\"]*\"|'[^']*')*>",
-    re.DOTALL,
-)
-_ATTRIBUTE = re.compile(r"([^\s\"'=<>/]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
-_ENTITY = re.compile(r"<!ENTITY")
-_ENCODING = re.compile(r"^(<\?xml[^>]*?\s)encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')")
-# Bytes that are parsed at once; nesting beyond which lxml refuses all but huge trees; how it calls texts beyond that.
-_PART, _LXML_NESTING, _HUGE_TEXT = 1 << 14, 250, "huge text node"
-_PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
-_PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
+_ATTRIBUTE = re.compile(r"(?<=\s)([^\s\"'=<>/]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 
 
 @dataclass(frozen=True, slots=True)
-class _Document:
+class Document:
     """What the nodes of one document share.
 
     Attributes:
         source: The file.
         log: Where findings go.
-        limits: Bounds on hostile input.
         places: Where the start tag of every element lies in the text.
     """
 
     source: Source
     log: DiagnosticLog
-    limits: Limits
     places: Mapping[Any, tuple[int, int]]
 
 
@@ -53,7 +36,7 @@ class Node:
     """An element and the place of its start tag."""
 
     element: Any
-    document: _Document
+    document: Document
 
     @property
     def source(self) -> Source:
@@ -73,7 +56,13 @@ class Node:
     @property
     def attributes(self) -> dict[str, str]:
         """All attributes as text."""
-        return {str(k): str(v) for k, v in self.element.attrib.items()}
+        # lxml looks each value up among all: many attributes take quadratic time in `items()`.
+        return {str(value.attrname): str(value) for value in self.element.xpath("@*")}
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all attributes."""
+        return [str(name) for name in self.element.attrib]
 
     @property
     def span(self) -> Span:
@@ -109,7 +98,7 @@ class Node:
         """Return an attribute's text, or fail."""
         value = self.get(name)
         if value is None:
-            hint = did_you_mean(name, self.attributes) or f'write {name}="..."'
+            hint = did_you_mean(name, self.names) or f'write {name}="..."'
             self.fail("ENV141", f"<{self.tag}> has no attribute {name!r}, which is expected", hint=hint)
         return value
 
@@ -120,9 +109,13 @@ class Node:
 
     def read(self, name: str, read: Callable[[Scanner], T]) -> T:
         """Read an attribute's whole text with a scanner that knows its place in the file."""
-        self.require(name)
-        start, end = self._value(name) or (self._place[0], self._place[0])
-        scanner = Scanner(self.source, self.log, self.document.limits, start, end, part=f"value of {name}")
+        text = self.require(name)
+        source, (start, end) = self.source, self._value(name) or (self._place[0], self._place[0])
+        # Behind references to characters, nothing stands where it does in the file.
+        if "&" in source.text[start:end]:
+            source = replace(Source.of(source.path, text, source.limits), place=source.span(start, end))
+            start, end = 0, len(text)
+        scanner = Scanner(source, self.log, start, end, part=f"value of {name}")
         value = read(scanner)
         if not scanner.at_end():
             scanner.fail("ENV143", f"{name} has more than was expected", hint="remove the rest")
@@ -162,7 +155,7 @@ class Node:
 
     def ignore_other_attributes(self, *known: str) -> None:
         """Report the attributes that nothing reads."""
-        others = [name for name in self.attributes if name not in known]
+        others = [name for name in self.names if name not in known]
         places = self._values() if others else {}
         for name in others:
             self.log.info(
@@ -192,102 +185,3 @@ class Node:
             # Comments and processing instructions have no text for a tag.
             if isinstance(element.tag, str) and (not wanted or element.tag.lower() in wanted):
                 yield Node(element, self.document)
-
-
-def parse_xml(source: Source, log: DiagnosticLog, limits: Limits) -> Node:
-    """Parse XML text into nodes that know their places.
-
-    Raises:
-        FormatError: The text is not well-formed, or declares entities.
-    """
-    entity = _ENTITY.search(source.text)
-    if entity:
-        log.fail(
-            FormatError, "ENV144", source.path, "XML entity declarations are not read; expected plain XML",
-            hint="write the text itself where an entity stands", span=source.span(*entity.span()),
-        )  # fmt: skip
-    root, end = _parse(source, log, limits)
-    tags = (m.span() for m in _MARKUP.finditer(source.text, 0, end) if m.group("tag"))
-    # lxml elements are proxies: they are equal while one is alive, so the map holds them as keys.
-    places = dict(zip((e for e in root.iter() if isinstance(e.tag, str)), tags, strict=False))
-    return Node(root, _Document(source, log, limits, places))
-
-
-def _parse(source: Source, log: DiagnosticLog, limits: Limits) -> tuple[Any, int]:
-    """Return the root and where the text that was read ends."""
-    begin = len(source.text) - len(source.text.lstrip())
-    try:
-        return _from_text(source, source.text[begin:], log, limits), len(source.text)
-    except etree.XMLSyntaxError as error:
-        line, column = error.position
-        place = source.line_span(line + source.span(begin).line - 1)
-        span = source.column_span(place.line, column)
-        if _HUGE_TEXT in str(error.msg):
-            log.fail(
-                FormatError, "ENV181", source.path,
-                "a text or attribute of more than ten million characters is not read",
-                hint="what is read in it are names and numbers", span=span,
-            )  # fmt: skip
-        message = f"not well-formed XML: {str(error.msg).rstrip()}"
-        cut = _problem_alone(source, place.line)
-        if cut is None:
-            log.fail(
-                FormatError, "ENV140", source.path, message, hint="is the file cut off, or a tag not closed?", span=span
-            )
-        log.warn(
-            FormatError, "ENV214", source.path, f"{message}; only the problem above it is read",
-            hint="the planner's library section is not needed, but its collision rules are unknown now", span=span,
-        )  # fmt: skip
-        closing, end = cut
-        try:
-            return _from_text(source, source.text[begin:end] + closing, log, limits), end
-        except etree.XMLSyntaxError:
-            log.fail(FormatError, "ENV140", source.path, message, hint="close every tag", span=span)
-
-
-def _from_text(source: Source, text: str, log: DiagnosticLog, limits: Limits) -> Any:
-    """Parse text part by part, so that a hostile one is refused before it is a tree.
-
-    Raises:
-        FormatError: Too many elements, or too many within each other.
-        etree.XMLSyntaxError: The text is not well-formed.
-    """
-    # The declared encoding is dropped: the text is decoded already, and lxml would decode it once more.
-    data = _ENCODING.sub(r"\1", text).encode("utf-8")
-    parser: Any = etree.XMLPullParser(
-        ("start", "end"), resolve_entities=False, no_network=True, load_dtd=False,
-        huge_tree=limits.nesting > _LXML_NESTING,
-    )  # fmt: skip
-    depth = count = 0
-    for at in range(0, max(1, len(data)), _PART):
-        try:
-            parser.feed(data[at : at + _PART])
-        finally:
-            for event, element in parser.read_events():
-                depth += 1 if event == "start" else -1
-                count += event == "start"
-                for what, found in (("nesting", depth), ("elements", count)):
-                    if found > getattr(limits, what):
-                        _refuse(source, element.sourceline, what, log, limits)
-    return parser.close()
-
-
-def _refuse(source: Source, line: int, what: str, log: DiagnosticLog, limits: Limits) -> NoReturn:
-    most = getattr(limits, what)
-    found = f"more than {most} elements lie within each other" if what == "nesting" else f"more than {most} elements"
-    log.fail(
-        FormatError, "ENV180", source.path, f"{found}; at most so many are read", hint=Limits.hint(what),
-        span=source.line_span(line),
-    )  # fmt: skip
-
-
-def _problem_alone(source: Source, fault_line: int) -> tuple[str, int] | None:
-    """Return how to cut a problem file behind its `<Problem>`: what closes it, and where.
-
-    None where the fault lies in the problem itself. Published problem files have ill-formed library sections, which
-    the planner's own parser took.
-    """
-    opening, closing = _PROBLEM_ROOT.search(source.text), _PROBLEM_END.search(source.text)
-    if not opening or not closing or source.span(closing.end()).line >= fault_line:
-        return None
-    return f"</{opening.group(1)}>", closing.end()
