@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .locking import LockOutcome, try_lock, unlock
+from .opening import NoRegularFileError, open_regular
 from .writing import replaced
 
 # Nobody needs more than a moment; a process that is stopped in that moment is not waited for forever.
@@ -196,6 +197,7 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
 def _named(xml: Path) -> set[str]:
     """Return the asset files that an MJCF file names."""
     try:
-        return set(_ASSET.findall(xml.read_text(encoding="utf-8", errors="replace")))
-    except (FileNotFoundError, IsADirectoryError):
+        with open_regular(xml) as file:
+            return set(_ASSET.findall(file.read().decode("utf-8", "replace")))
+    except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
         return set()

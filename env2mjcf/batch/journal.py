@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConversionError, DiagnosticLog
 from ..locking import LockOutcome, try_lock
+from ..opening import open_regular
 
 _FORMAT = 1
 _ZEROS = bytes(1 << 20)
@@ -69,7 +70,8 @@ class Partial:
     def progress(self) -> Progress | None:
         """Return how far an earlier run came; None if there was none, or its journal cannot be read."""
         try:
-            stored = json.loads(self._journal.read_text(encoding="utf-8"))
+            with open_regular(self._journal) as file:
+                stored = json.load(file)
             if stored.pop("format") == _FORMAT:
                 return Progress(str(stored["job"]), int(stored["rows"]), int(stored["done"]), str(stored["digest"]))
         except (OSError, ValueError, KeyError, TypeError, AttributeError):

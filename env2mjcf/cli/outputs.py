@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..errors import ConversionError, DiagnosticLog
 from ..formats.path import begins_as_path
+from ..opening import open_regular
 
 # Of a file, as much as tells what it is.
 _BEGINNING = 4096
@@ -18,9 +19,7 @@ def refuse_foreign_path(out: Path) -> None:
     Raises:
         ConversionError: It is none.
     """
-    if not out.is_file():
-        return
-    with suppress(OSError), out.open("rb") as file:
+    with suppress(OSError), open_regular(out) as file:
         beginning = file.read(_BEGINNING).decode("utf-8", "replace")
         if beginning.strip() and not begins_as_path(beginning):
             DiagnosticLog().fail(

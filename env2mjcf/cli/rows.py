@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import DiagnosticLog, FormatError
 from ..formats.rows import LARGEST, check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
+from ..opening import open_regular
 from ..options import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
@@ -115,7 +116,7 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
         FormatError: It is none, or a row fits no robot.
     """
     if not os.path.isfile(path) or os.path.getsize(path) > limits.file_bytes:
-        read_source(path, log, limits)  # says what is wrong
+        read_source(path, log, limits, regular=True)  # says what is wrong
     try:
         array = _numpy_array(path)
     except Exception:  # NumPy's reader raises whatever it stumbles over
@@ -143,7 +144,7 @@ def _numpy_array(path: str) -> Array:
     Raises:
         Exception: It is none; of whatever kind.
     """
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         version = np.lib.format.read_magic(file)
         header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
         shape, _, dtype = header[version](file)
