@@ -35,6 +35,7 @@ ALPHA = MODELS / "alpha" / "alpha.env"
 
 # All that changes in modules while they are used, and why that may be.
 CHANGING = {
+    "env2mjcf.contact.ending._at_work": "threads that are at rows just now: the interpreter waits for them at its end",
     "env2mjcf.contact.remote._memory": "the scenes that a worker process was sent, by the digest of all they hold",
     "env2mjcf.contact.remote._parcels": "scenes as bytes, while the scenes live",
     "env2mjcf.forking._locks": "all locks, while they live: a forked child opens them",
