@@ -95,7 +95,7 @@ def test_other_signals_end_it_as_tidily(number: signal.Signals, tmp_path: Path) 
     child = subprocess.Popen(
         [sys.executable, "-m", "env2mjcf", "play", "scene.env", "a.path", "-o", "made/a.mp4", "--seconds", "60"],
         cwd=tmp_path, env={**folders.ENVIRONMENT, "TMPDIR": str(tmp_path / "temporary")}, stderr=subprocess.PIPE,
-        start_new_session=True, preexec_fn=interrupting.heed,
+        start_new_session=True, preexec_fn=interrupting.heed,  # noqa: PLW1509
     )  # fmt: skip
     try:
         wait_for(lambda: list((tmp_path / "temporary").glob("env2mjcf-*/scene.mjb")), child)
