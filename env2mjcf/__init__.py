@@ -5,7 +5,7 @@ from __future__ import annotations
 from . import starting as _starting
 
 if _starting.is_program():
-    _starting.end_at_once()
+    _starting.begin()
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

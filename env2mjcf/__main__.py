@@ -12,7 +12,7 @@ def run() -> int:
 
         return main()
     except KeyboardInterrupt:
-        return 130
+        return starting.interrupted_status()
     finally:
         # All is done; what the interpreter tidies up is no place for a traceback.
         starting.end_at_once()

@@ -26,6 +26,7 @@ from .geometry.repair import refuse_work, repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
 from .kinematics import RobotKinematics
 from .model import Body, Environment, MultiBody, MultiBodyKind
+from .opening import open_regular
 from .options import Options, PathArgument
 from .work import TooMuchWorkError, Work
 
@@ -72,7 +73,7 @@ def lint(
     other meshes of the scene, and the other files, are still looked at.
 
     Args:
-        paths: Scenes, robot files, meshes; folders are searched for `.env`, `.robot` and `.xml` files.
+        paths: Scenes, robot files, meshes, no pipes; folders are searched for `.env`, `.robot` and `.xml` files.
         options: How to read and load; `strict` is ignored, so that a warning does not end a file.
         progress: Show a progress bar on a terminal.
 
@@ -131,7 +132,7 @@ def _kind(path: str) -> Kind:
 
 def _xml_kind(path: str) -> Kind:
     try:
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             start = file.read(_SNIFFED_BYTES)
     except OSError:
         return Kind.SCENE  # whose reader says what is wrong
@@ -164,7 +165,7 @@ def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
     from .simulation.preparing import prepare
 
     try:
-        if is_robot_file(read_source(path, DiagnosticLog(), options.limits)):
+        if is_robot_file(read_source(path, DiagnosticLog(), options.limits, regular=True)):
             log = DiagnosticLog()
             _lint_robot(path, options, log)
             return tuple(log)
@@ -199,7 +200,7 @@ def _resolved(environment: Environment, body: Body, options: Options, log: Diagn
 
 
 def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
-    source = read_source(path, log, options.limits)
+    source = read_source(path, log, options.limits, regular=True)
     robot = xml_scene.read_robot(parse_xml(source, log)) if is_xml(source) else read_robot(Scanner(source, log))
     RobotKinematics.of(robot, log).home(log)
 

@@ -17,6 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from .locking import FolderBusyError, LockOutcome, alone, try_lock
+from .opening import NoRegularFileError, open_regular
 from .writing import replaced
 
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
@@ -170,6 +171,7 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
 def _named(xml: Path) -> set[str]:
     """Return the asset files that an MJCF file names."""
     try:
-        return set(_ASSET.findall(xml.read_text(encoding="utf-8", errors="replace")))
-    except (FileNotFoundError, IsADirectoryError):
+        with open_regular(xml) as file:
+            return set(_ASSET.findall(file.read().decode("utf-8", "replace")))
+    except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
         return set()

@@ -94,7 +94,7 @@ def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], ta
         tally.wrong.append(f"{verb} after {after:.3f} s: still there after 30 seconds")
         return
     finally:
-        left = _left_in_session(child.pid)
+        left = left_in_session(child.pid)
         for pid in left:
             os.kill(pid, signal.SIGKILL)
     what = f"{verb} after {after:.3f} s: status {child.returncode}"
@@ -146,7 +146,7 @@ def heed() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _left_in_session(session: int) -> list[int]:
+def left_in_session(session: int) -> list[int]:
     """Return the processes of a session that are still there a second after its first one has ended."""
     deadline = time.monotonic() + 1.0
     while True:

@@ -1,4 +1,4 @@
-"""Ctrl-C at any time: status 130, no traceback, nothing half-written, nothing that goes on."""
+"""Ctrl-C and other signals at any time: no traceback, nothing half-written, nothing that goes on."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import folders
 import interrupting
 import pytest
+from extras import needs
+
+from env2mjcf.view import offscreen
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 
@@ -73,3 +78,54 @@ def test_a_library_leaves_ctrl_c_alone() -> None:
         [sys.executable, "-c", code + check], env=folders.ENVIRONMENT, check=True, capture_output=True,
         preexec_fn=interrupting.heed,
     )  # fmt: skip
+
+
+def wait_for(what: Callable[[], object], child: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + 60
+    while not what() and child.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+@needs("view")
+@pytest.mark.skipif(offscreen.backend() is None, reason="no GL")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_other_signals_end_it_as_tidily(number: signal.Signals, tmp_path: Path) -> None:
+    interrupting.prepare(tmp_path)
+    (tmp_path / "temporary").mkdir()
+    child = subprocess.Popen(
+        [sys.executable, "-m", "env2mjcf", "play", "scene.env", "a.path", "-o", "made/a.mp4", "--seconds", "60"],
+        cwd=tmp_path, env={**folders.ENVIRONMENT, "TMPDIR": str(tmp_path / "temporary")}, stderr=subprocess.PIPE,
+        start_new_session=True, preexec_fn=interrupting.heed,  # noqa: PLW1509
+    )  # fmt: skip
+    try:
+        wait_for(lambda: list((tmp_path / "temporary").glob("env2mjcf-*/scene.mjb")), child)
+        for _ in range(3):  # a terminal, its shell, and whoever else
+            child.send_signal(number)
+        said = child.communicate(timeout=60)[1]
+    finally:
+        left = interrupting.left_in_session(child.pid)
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
+    assert (child.returncode, said, left) == (128 + number, b"", [])
+    assert list((tmp_path / "temporary").iterdir()) == []
+    assert list((tmp_path / "made").iterdir()) == []
+
+
+def test_what_nohup_ignores_stays_ignored(tmp_path: Path) -> None:
+    interrupting.prepare(tmp_path)
+    (tmp_path / "first").mkdir()
+    # Sent while it is imported, and once more in the verb.
+    (tmp_path / "first" / "mujoco.py").write_text(
+        "import os, signal, sys\nos.kill(os.getpid(), signal.SIGHUP)\nsys.path.remove(os.path.dirname(__file__))\n"
+        "del sys.modules['mujoco']\nimport mujoco\nos.kill(os.getpid(), signal.SIGHUP)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path / "first"), str(folders.ROOT)])}
+    command = [sys.executable, "-m", "env2mjcf", "info", "scene.env"]
+    for ignored, status in ((True, 0), (False, -signal.SIGHUP)):
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, check=False, timeout=60,
+            preexec_fn=lambda ignored=ignored: signal.signal(
+                signal.SIGHUP, signal.SIG_IGN if ignored else signal.SIG_DFL
+            ),
+        )  # fmt: skip
+        assert done.returncode in (status, 129) if not ignored else done.returncode == status

@@ -35,6 +35,7 @@ ALPHA = MODELS / "alpha" / "alpha.env"
 
 # All that changes in modules while they are used, and why that may be.
 CHANGING = {
+    "env2mjcf.contact.ending._at_work": "threads that are at rows just now: the interpreter waits for them at its end",
     "env2mjcf.contact.remote._memory": "the scenes that a worker process was sent, by the digest of all they hold",
     "env2mjcf.contact.remote._parcels": "scenes as bytes, while the scenes live",
     "env2mjcf.forking._locks": "all locks, while they live: a forked child opens them",
@@ -111,7 +112,7 @@ def test_modules_hold_no_state_but_what_is_listed_here(tmp_path: Path) -> None:
 
 
 def test_no_function_assigns_to_variables_of_its_module() -> None:
-    # The guard of Ctrl-C belongs to the process: it stands in a module that imports nothing.
+    # What ends the program belongs to the process, and concerns no library.
     sources = [p.read_text() for p in (ROOT / "env2mjcf").rglob("*.py") if p.name != "starting.py"]
     assert len(sources) > 100
     assert [line for text in sources for line in text.splitlines() if line.lstrip().startswith("global ")] == []

@@ -15,6 +15,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..options import Options
+from ..statuses import DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .meter import Meter
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
@@ -81,7 +82,7 @@ class Batch:
             print_json({**dataclasses.asdict(result), "rate": result.rate, "diagnostics": scene.diagnostics})
         else:
             print_parts([_summary(result)])
-        return 0
+        return DONE
 
 
 def _say(message: str) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
+from ..statuses import BAD_INPUT, DONE
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_json
 
@@ -49,17 +50,17 @@ class Cache:
                 cache.clear()
             except OSError as error:
                 print(f"env2mjcf: cache: {one_line(str(error))}", file=sys.stderr)
-                return 3
+                return BAD_INPUT
         if self.output.json:
             print_json(before if self.action == "info" else {"folder": before.folder, "removed": before.entries})
-            return 0
+            return DONE
         folder = one_line(os.fspath(before.folder)) if before.folder else "none: there is no home folder"
         size = f"{before.entries} entries, {before.bytes / 2**20:.1f} MiB"
         if self.action == "clear":
             print(f"removed {size} from {folder}")
         else:
             print(f"folder  {folder}\nholds   {size}\nlimit   {before.limit / 2**20:.0f} MiB")
-        return 0
+        return DONE
 
     def _warm(self) -> int:
         from ..contact.exact.engine import compile_all, require
@@ -70,4 +71,4 @@ class Cache:
             print_json({"seconds": seconds})
         else:
             print(f"the exact engine is ready ({seconds:.1f} s)")
-        return 0
+        return DONE

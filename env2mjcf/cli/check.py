@@ -15,6 +15,7 @@ from tyro.conf import Positional
 
 from ..errors import ConversionError, DiagnosticLog
 from ..options import Options
+from ..statuses import BAD_INPUT, DONE, FINDING
 from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .judgements import (
@@ -126,8 +127,8 @@ class Check:
                     draw(scene, rows, judge, edges, self.picture)
             except ConversionError as error:
                 print_diagnostics(error.diagnostics, self.output.verbose)
-                return 3
-        return 0 if valid else 1
+                return BAD_INPUT
+        return DONE if valid else FINDING
 
     def _edges(self, scene: Scene, graph: Graph | None) -> EdgeJudge | None:
         from ..simulation.edge_verdicts import EdgeJudge

@@ -13,6 +13,7 @@ from tyro.conf import Positional
 
 from ..names import file_stem
 from ..options import Options
+from ..statuses import DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import one_line, print_diagnostics, print_json, working
 
@@ -64,4 +65,4 @@ class Convert:
             path = os.fspath(result.xml)
             # A script needs the path as it is, a terminal must not see control characters in it.
             print(one_line(path) if sys.stdout.isatty() else path)
-        return 0
+        return DONE

@@ -13,6 +13,7 @@ from ..dialects import RULES
 from ..kinematics import RobotKinematics
 from ..model import Boundary, Dialect, Environment, Resolution
 from ..names import body_names, dof_names
+from ..opening import open_regular
 from ..scaling import scaled
 from ..space import ConfigurationSpace
 from .readings import Readings, compare_readings
@@ -162,5 +163,5 @@ def _environment_file(environment: Environment) -> str:
 
 
 def _begins_as_xml(path: Path) -> bool:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.read(1024).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")

@@ -13,6 +13,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog, Env2MjcfError
 from ..options import Options
+from ..statuses import BAD_INPUT, DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import plain, print_diagnostics, print_json, print_parts, working
 from .tables import geometry_part, pairs_part, text_part
@@ -69,7 +70,7 @@ class Info:
             print_parts(self._parts(summary, scene))
         # Findings that are only worth knowing are part of what was asked for.
         print_diagnostics(loaded.diagnostics, verbose=not self.output.json or self.output.verbose)
-        return 3 if error else 0
+        return BAD_INPUT if error else DONE
 
     def _load(self, options: Options) -> Scene | Env2MjcfError:
         from ..simulation.preparing import prepare

@@ -14,6 +14,7 @@ from tyro.conf import Positional
 
 from ..errors import Diagnostic, Severity
 from ..options import Options
+from ..statuses import BAD_INPUT, DONE, FINDING
 from .arguments import OptionFlags, Output, OutputFlags
 from .printing import one_line, print_diagnostic, print_json, printable
 
@@ -75,8 +76,8 @@ class Lint:
         if not results:
             print("env2mjcf: lint: no scene, robot or mesh was found", file=sys.stderr)
         if not all(os.path.lexists(path) for path in self.paths):
-            return 3  # what the error says
-        return 1 if errors or (self.options.strict and warnings) else 0
+            return BAD_INPUT  # what the error says
+        return FINDING if errors or (self.options.strict and warnings) else DONE
 
 
 def github_annotation(diagnostic: Diagnostic, path: str) -> str:

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
-from .. import starting
+from .. import faults, starting
 from ..errors import Env2MjcfError, did_you_mean
+from ..statuses import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE
+from ..streams import ResultsError
 from ..view.offscreen import RenderError, refuse_unknown
 from .arguments import Verb, parse
 from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
-
-DONE, FINDING, WRONG_USAGE, BAD_INPUT, FAULT = range(5)
-# What shells report for a program that is stopped by SIGINT or SIGPIPE.
-_INTERRUPTED, _BROKEN_PIPE = 130, 141
 
 # Each verb: its module here, its class there, what it does.
 VERBS = {
@@ -54,7 +52,8 @@ examples:
   env2mjcf convert --help                         all options of a verb
 
 exit status: 0 done, free or valid; 1 a finding (collision, invalid configuration, lint error); 2 wrong usage;
-3 bad input; 4 a fault of env2mjcf. Results go to stdout, everything else to stderr.
+3 bad input, or results that cannot be written; 4 a fault of env2mjcf, or too little memory; 128 and the number of a
+signal that ended it. Results go to stdout, everything else to stderr.
 """
 
 
@@ -77,9 +76,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except BrokenPipeError:
         _abandon_stdout()
-        return _BROKEN_PIPE
+        return BROKEN_PIPE
+    except ResultsError as error:
+        _abandon_stdout()
+        _complain(f"the results cannot be written to standard output: {error.strerror}")
+        return BAD_INPUT
     except KeyboardInterrupt:
-        return _INTERRUPTED
+        return starting.interrupted_status()
     except Exception as error:
         return _fault(error)
     return status
@@ -126,11 +129,11 @@ def _run(name: str, verb: Verb) -> int:
         if verb.output.json:
             print_json({"error": error.diagnostic, "diagnostics": error.diagnostics})
         return BAD_INPUT
-    except BrokenPipeError:
+    except (BrokenPipeError, ResultsError):
         raise
     except Exception as error:
         if starting.interrupted:
-            return _INTERRUPTED
+            return starting.interrupted_status()
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
@@ -142,10 +145,9 @@ def _run(name: str, verb: Verb) -> int:
 def _fault(error: Exception, debug: bool = False) -> int:
     """Report what should not have happened, unless it happened because of Ctrl-C, which libraries turn into others."""
     if starting.interrupted:
-        return _INTERRUPTED
+        return starting.interrupted_status()
     _show_traceback(debug)
-    notes = "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
-    _complain(f"a fault of env2mjcf, please report it: {type(error).__name__}: {error}{notes} (--debug shows where)")
+    _complain(faults.describe(error))
     return FAULT
 
 

@@ -15,6 +15,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog, FormatError
 from ..options import Options, PathArgument
+from ..statuses import DONE, FINDING
 from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .configurations import refuse_without_freedom
@@ -96,7 +97,7 @@ class Plan:
         print_diagnostics(log, self.output.verbose)
         if (wrong := _wrong(scene, query)) is not None:
             self._say_wrong(wrong, log)
-            return 1
+            return FINDING
         from .planning_meter import PlanningMeter
 
         with PlanningMeter(self.time) as meter:
@@ -109,7 +110,7 @@ class Plan:
             print_json({**_summary(scene, result, written), "diagnostics": tuple(log)})
         else:
             print_parts(_lines(result, written))
-        return 0 if result.solved else 1
+        return DONE if result.solved else FINDING
 
     def _query(self, scene: Scene, log: DiagnosticLog) -> Query:
         """Return the task that is to be planned.

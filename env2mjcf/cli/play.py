@@ -16,6 +16,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import Options
+from ..statuses import DONE
 from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .cameras import camera_of, size_of
@@ -107,7 +108,7 @@ class Play:
             )  # fmt: skip
         else:
             print_parts(_lines(made))
-        return 0
+        return DONE
 
 
 def _lines(made: Film) -> Iterator[Text]:

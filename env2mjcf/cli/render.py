@@ -12,6 +12,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import Options
+from ..statuses import DONE
 from ..writing import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .cameras import camera_of, size_of
@@ -89,7 +90,7 @@ class Render:
         else:
             lines = [Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching]
             print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold"), *lines])
-        return 0
+        return DONE
 
     def _rows(self, scene: Scene) -> Array:
         from .configurations import of_numbers

@@ -116,7 +116,7 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
         FormatError: It is none, or a row fits no robot.
     """
     if not os.path.isfile(path) or os.path.getsize(path) > limits.file_bytes:
-        read_source(path, log, limits)  # says what is wrong
+        read_source(path, log, limits, regular=True)  # says what is wrong
     array = map_array(path, log)
     rows = np.atleast_2d(array)
     if rows.ndim != 2 or not rows.size:

@@ -12,6 +12,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import DialectName, Limits, PathArgument, Semantics
+from ..statuses import DONE
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_diagnostics, print_json, print_parts
 
@@ -85,7 +86,7 @@ class Translate:
             print_json({"dialect": self.dialect, **_files(written), "diagnostics": tuple(log)})
         else:
             print_parts(_lines(result.environment, written))
-        return 0
+        return DONE
 
     def _boundary(self) -> Boundary | None:
         from ..model import Boundary, BoundaryShape

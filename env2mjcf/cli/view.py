@@ -14,6 +14,7 @@ from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
 from ..options import Options, PathArgument
+from ..statuses import DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import one_line, print_diagnostics, print_json, working
 
@@ -73,7 +74,7 @@ class View:
         print_diagnostics(log, self.output.verbose)
         if self.native:
             native.show(scene, scene.queries[0].q[0] if scene.queries else scene.space.home)
-            return 0
+            return DONE
         return self._serve(scene, path, log)
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
@@ -101,7 +102,7 @@ class View:
                     viewer.close()
         except KeyboardInterrupt:
             pass
-        return 0
+        return DONE
 
     def _announce(self, port: int, log: DiagnosticLog) -> None:
         url = f"http://127.0.0.1:{port}"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import operator
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from .chunks import Chunks
+from .ending import working
 from .queries import ContactQueries
 from .remote import on_executor, worker_count
 
@@ -113,27 +115,37 @@ def _noting(store: Store, bar: Any) -> Store:
 
 def _in_threads(queries: ContactQueries, question: Question, store: Store, count: int) -> None:
     """Work in this thread and in others beside it, which end before this returns, whatever happens."""
+    errors: list[BaseException] = []
     chunks = Chunks(question.rows, count, question.row_bytes, _LEAST_HERE)
 
     def work() -> None:
         try:
             while (rows := chunks.take()) is not None:
                 began = time.perf_counter()
-                store(rows, question.function(queries, *(c[rows] for c in question.columns), *question.extras))
+                with working():
+                    store(rows, question.function(queries, *(c[rows] for c in question.columns), *question.extras))
                 chunks.took(rows.stop - rows.start, time.perf_counter() - began)
         finally:
             # After an error, or Ctrl-C in this thread, the others end with the chunk that they are at.
             chunks.close()
 
-    if count == 1:
-        work()
-        return
-    pool = ThreadPoolExecutor(count - 1, thread_name_prefix="env2mjcf")
+    def help_out() -> None:
+        try:
+            work()
+        except BaseException as error:
+            errors.append(error)
+
+    # Not those of an executor, which the interpreter waits for at its end: these are daemons if the one that asks is.
+    started: list[threading.Thread] = []
     try:
-        others = [pool.submit(work) for _ in range(count - 1)]
+        for number in range(1, count):
+            other = threading.Thread(target=help_out, name=f"env2mjcf-{number}")
+            other.start()
+            started.append(other)
         work()
-        for other in others:
-            other.result()
     finally:
         chunks.close()
-        pool.shutdown(wait=True, cancel_futures=True)
+        for other in started:
+            other.join()
+    if errors:
+        raise errors[0]

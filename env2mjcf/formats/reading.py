@@ -173,7 +173,7 @@ def _read_beside(source: Source, name: str, node: Node, options: Options, log: D
             FormatError, "ENV150", name, f"{name} lies outside the folder of {source.path}; expected a file in it",
             hint="allow it with allow_outside=True (--allow-outside)", span=named_at,
         )  # fmt: skip
-    return read_source(path, log, options.limits, named_at)
+    return read_source(path, log, options.limits, named_at, regular=True)
 
 
 def _inside(path: Path, folder: Path) -> bool:

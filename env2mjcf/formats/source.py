@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
+from ..opening import open_regular
 from ..options import Limits, PathArgument
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -116,7 +117,14 @@ def wide_encoding(data: bytes) -> str:
     return _ZEROS.get(tuple(i for i in range(4) if begin and not any(begin[i::4])), "")
 
 
-def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at: Span | None = None) -> Source:
+def read_source(
+    path: PathArgument,
+    log: DiagnosticLog,
+    limits: Limits,
+    named_at: Span | None = None,
+    *,
+    regular: bool = False,
+) -> Source:
     """Read a text file.
 
     UTF-8 with or without a byte order mark; Latin-1 with a warning.
@@ -126,12 +134,13 @@ def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at
         log: Where findings go.
         limits: Bounds on hostile input.
         named_at: Where another file names this one, for messages.
+        regular: Whether it has to be a regular file. Only who names a file himself may name a pipe, and wait for it.
 
     Raises:
         FormatError: The file is missing, a folder, unreadable, too large, UTF-16 or UTF-32, or not text.
     """
     name = os.fsdecode(path)
-    data = _read_bytes(name, log, limits, named_at)
+    data = _read_bytes(name, log, limits, named_at, regular)
     wide = wide_encoding(data)
     if wide:
         log.fail(
@@ -160,7 +169,7 @@ def read_source(path: PathArgument, log: DiagnosticLog, limits: Limits, named_at
         return source
 
 
-def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | None) -> bytes:
+def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | None, regular: bool) -> bytes:
     def fail(code: str, message: str, hint: str) -> NoReturn:
         log.fail(FormatError, code, name, message, hint=hint, span=named_at)
 
@@ -171,7 +180,7 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
             inside = [n for n in _names_in(name) if n.endswith(_SCENE_EXTENSIONS)]
             holds = f"; it holds {', '.join(inside[:8])}" if inside else ""
             fail("ENV102", f"{name} is a folder; expected a file", f"name the file in it{holds}")
-        with open(name, "rb") as file:
+        with open_regular(name) if regular else open(name, "rb") as file:
             # One more than allowed: the size that the system states is no bound for pipes and devices.
             data = read_at_most(file, limits.file_bytes + 1)
     except FileNotFoundError:

@@ -7,7 +7,6 @@ import os
 import platform
 import re
 import secrets
-import stat
 import struct
 import sys
 import time
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog
+from ..opening import NoRegularFileError, open_regular
 from .packing import pack, unpack
 
 T = TypeVar("T")
@@ -42,10 +42,10 @@ _ENTRY = re.compile(r"[0-9a-f]{64}\.npz")
 _STAGED = re.compile(r"\.[0-9a-f]{64}-[0-9a-f]{16}\.npz")
 _ALTERED = "its content is not what was written"
 _LIBRARIES = ("numpy", "mujoco", "coacd")
-# All that numpy raises on files that are cut short or altered.
+# What stands in an entry's place without being a file, and all that numpy raises on files cut short or altered.
 _DAMAGE = (
-    zipfile.BadZipFile, struct.error, EOFError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError,
-    RuntimeError,
+    NoRegularFileError, zipfile.BadZipFile, struct.error, EOFError, ValueError, TypeError, LookupError,
+    ArithmeticError, MemoryError, RuntimeError,
 )  # fmt: skip
 
 
@@ -131,11 +131,11 @@ class GeometryCache:
             value = unpack(_read(path, key), kinds, known)
         except FileNotFoundError:
             pass
-        except OSError as error:
-            self._complain(error, log)
         except _DAMAGE as error:
             message = f"an entry of the geometry cache is damaged ({type(error).__name__}) and was made anew"
             log.info("GEO260", subject, message)
+        except OSError as error:
+            self._complain(error, log)
         else:
             with suppress(OSError):
                 os.utime(path)
@@ -261,12 +261,9 @@ def _read(path: Path, key: str) -> dict[str, NDArray[Any]]:
     Raises:
         ValueError: It is not what was written under this key.
     """
-    with open(path, "rb", opener=_without_waiting) as file:
-        found = os.fstat(file.fileno())
-        if not stat.S_ISREG(found.st_mode):
-            raise ValueError("it is no file")
+    with open_regular(path) as file:
         try:
-            arrays = _arrays(file, found.st_size)
+            arrays = _arrays(file, os.fstat(file.fileno()).st_size)
         except OSError as error:
             # It leads to places that are not in the file.
             raise ValueError(_ALTERED) from error
@@ -285,11 +282,6 @@ def _arrays(file: IO[bytes], size: int) -> dict[str, NDArray[Any]]:
     file.seek(0)
     with np.load(file, allow_pickle=False) as stored:
         return {name: stored[name] for name in stored.files}
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; a pipe that stands in its place would be waited for."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _digest(key: str, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:

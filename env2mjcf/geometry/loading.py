@@ -16,6 +16,7 @@ from ..formats.gms import read_gms
 from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
 from ..formats.source import read_at_most, wide_encoding
+from ..opening import open_regular
 from ..options import Limits
 from .mesh import Mesh
 
@@ -70,7 +71,7 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
 
 def _content(path: Path, log: DiagnosticLog, limits: Limits) -> bytes:
     try:
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             # One byte more than allowed tells a large file without reading it.
             data = read_at_most(file, limits.file_bytes + 1)
     except (OSError, ValueError) as error:

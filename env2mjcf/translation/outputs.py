@@ -36,7 +36,7 @@ class Output:
 
 _READERS: dict[Kind, Callable[[Source, DiagnosticLog], object]] = {
     Kind.ENVIRONMENT: detect,
-    Kind.ROBOT: lambda source, log: read_robot(Scanner(source, log, source.limits)),
+    Kind.ROBOT: lambda source, log: read_robot(Scanner(source, log)),
     Kind.QUERY: number_lines,
 }
 

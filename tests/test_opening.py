@@ -1,0 +1,106 @@
+"""Pipes, where files are expected: refused where a file or a folder names them, read where the user does."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import folders
+import numpy as np
+import pytest
+from scenes import free_cube, write_scene
+
+from env2mjcf.opening import NoRegularFileError, open_regular
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX pipes")
+MODELS = folders.ROOT / "models"
+# A hang is a failure, and takes no longer than this.
+_SECONDS = 120
+
+
+def run(*words: str | Path, data: bytes | None = None) -> tuple[int, str]:
+    """Run the program; return its status, and what it says on both streams."""
+    done = subprocess.run(
+        [sys.executable, "-m", "env2mjcf", *map(str, words)], env=folders.ENVIRONMENT, input=data,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False, timeout=_SECONDS,
+    )  # fmt: skip
+    return done.returncode, done.stdout.decode()
+
+
+def test_only_regular_files_are_opened(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    (tmp_path / "link").symlink_to("file")
+    for name in ("file", "link"):
+        with open_regular(tmp_path / name) as file:
+            assert file.read() == b"content"
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/zero"):
+        with pytest.raises(NoRegularFileError):
+            open_regular(path)
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind(os.path.relpath(tmp_path / "socket"))
+        with pytest.raises(OSError, match="socket"):
+            open_regular(tmp_path / "socket")
+    with pytest.raises(IsADirectoryError):
+        open_regular(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["maze.robot", "maze.env"])
+def test_a_pipe_that_a_problem_names_is_refused(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "maze"
+    shutil.copytree(MODELS / "maze", folder)
+    (folder / name).unlink()
+    os.mkfifo(folder / name)
+    status, said = run("info", folder / "maze.xml")
+    assert status == 3
+    assert "ENV104" in said
+    assert "no regular file" in said
+    assert f"{name}" in said.splitlines()[1]  # the line of the problem that names it
+
+
+@pytest.mark.parametrize("name", ["b.env", "b.robot", "b.xml", "b.g"])
+def test_lint_waits_for_no_pipe(name: str, tmp_path: Path) -> None:
+    write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    os.mkfifo(tmp_path / name)
+    status, said = run("lint", tmp_path / name, tmp_path)
+    assert status == 1
+    assert ("GEO204" if name == "b.g" else "ENV104") in said
+    assert "no regular file" in said
+    assert "2 files" in said
+
+
+def test_a_file_of_configurations_is_no_pipe(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    os.mkfifo(tmp_path / "q.npy")
+    status, said = run("check", scene, tmp_path / "q.npy")
+    assert (status, "no regular file" in said) == (3, True)
+
+
+def test_pipes_in_the_folder_that_is_written_to_are_not_waited_for(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    out = tmp_path / "out"
+    out.mkdir()
+    os.mkfifo(out / "other.xml")
+    os.mkfifo(out / "v.npy.journal")
+    # The second conversion looks at which assets others use.
+    other = write_scene(tmp_path / "second", free_cube("3 0 0 0 0 0", "cube.g 0 4 0 0 0 0"))
+    for entry in (scene, other):
+        assert run("convert", entry, out)[0] == 0
+    np.save(tmp_path / "q.npy", np.zeros((2, 6)))
+    assert run("batch", scene, tmp_path / "q.npy", "-o", out / "v.npy")[0] == 0
+
+
+def test_the_user_may_name_a_pipe(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    expected = run("check", scene)
+    status, said = run("check", "/dev/stdin", "--mesh-dirs", tmp_path, data=scene.read_bytes())
+    assert (status, said) == expected
+    assert status == 0
+    query = b"0 4 0 0 0 0 0\n"
+    status, said = run("check", scene, "--query", "/dev/stdin", data=query)
+    assert status == 1
+    assert "1 in collision" in said
