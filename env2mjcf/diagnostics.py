@@ -74,6 +74,7 @@ CATALOGUE: dict[str, str] = {
     "ENV180": "An XML file has more elements, or more within each other, than `limits.elements` and `limits.nesting`.",
     "ENV181": "An XML file holds a text or an attribute of more than ten million characters.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
+    "ENV183": "A boundary, or a limit of a joint, is too large to be computed with.",
     # Text files that are doubtful.
     "ENV201": "A keyword is written in a case that the original reader does not take.",
     "ENV202": "A keyword is misspelt, or another word stands in its place; it was read as meant.",
@@ -223,6 +224,8 @@ CATALOGUE: dict[str, str] = {
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
+    "CFG536": "The file's PositionRes is so small that edges would take more checks than end.",
+    "CFG537": "An edge is so long that it would take more checks than end.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",

@@ -19,6 +19,10 @@ Engine = Literal["auto", "exact", "mujoco"]
 DialectName = Literal["A", "B", "C", "D", "E"]
 PathArgument = str | PathLike[str]
 
+LARGEST = 1e30
+"""Largest coordinate, in file units or metres, that is computed with: volumes and inertias of what is larger overflow,
+MuJoCo's own numbers end at 3e38, and planners do not end in a wider space."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:

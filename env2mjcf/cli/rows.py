@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
-from ..formats.rows import LARGEST, check_rows, coordinate, coordinate_hint, split_row
+from ..formats.rows import check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
-from ..options import Limits
+from ..options import LARGEST, Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
 from ..transforms import Array

@@ -13,7 +13,7 @@ from ..errors import ConversionError, DiagnosticLog, GeometryError
 from ..kinematics import RobotKinematics
 from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
-from ..options import Limits, Options
+from ..options import LARGEST, Limits, Options
 from ..transforms import Array
 from ..work import Work
 from .analysis import Analysis
@@ -21,7 +21,7 @@ from .bounded import bounded
 from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
-from .loading import LARGEST, load_mesh
+from .loading import load_mesh
 from .mesh import Mesh
 from .repair import Repaired, repair_diagnostics, repaired
 from .resolve import resolve_all

@@ -16,7 +16,7 @@ from ..formats.gms import read_gms
 from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
 from ..formats.source import read_at_most, wide_encoding
-from ..options import Limits
+from ..options import LARGEST, Limits
 from .mesh import Mesh
 
 _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] = {
@@ -27,9 +27,6 @@ _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] =
 
 # Of what trimesh reads: formats that are one self-contained file of triangles.
 _THROUGH_TRIMESH = (".stl", ".ply", ".off", ".glb")
-
-# Volumes and inertias of larger meshes overflow; MuJoCo's own numbers end at 3e38.
-LARGEST = 1e30
 
 READABLE = (*_READERS, *_THROUGH_TRIMESH)
 
