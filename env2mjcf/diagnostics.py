@@ -177,6 +177,7 @@ CATALOGUE: dict[str, str] = {
     # What is written for MuJoCo.
     "MJC401": "MuJoCo refuses a model.",
     "MJC402": "MuJoCo warns of a model, and Python is told that warnings are errors.",
+    "MJC403": "A chain has more links than MuJoCo's XML parser reads within each other.",
     "MJC410": "A loop that closes by a slide stays open in the simulation.",
     "MJC411": "A free base gets no actuator.",
     "MJC412": "An attribute of the environment concerns the planner, and is not written.",
