@@ -38,8 +38,8 @@ class Limits:
         polygon_work: Points looked at while polygons of one mesh are cut into triangles: a polygon that is not
             convex takes up to the square of its corners, or more.
         scene_elements: Triangles of all bodies of a scene, those of a mesh that several bodies have counted each time.
-        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way: about 25 kB of memory each
-            while MuJoCo compiles it, more where they have many corners.
+        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way: about 25 kB of memory
+            each while MuJoCo compiles it, more where they have many corners.
         mesh_work: Comparisons of parts of one mesh while it is repaired and cut into convex pieces: about half a
             microsecond each.
         pairs: Pairs of bodies of a scene that may touch.
