@@ -74,6 +74,7 @@ CATALOGUE: dict[str, str] = {
     "ENV180": "An XML file has more elements, or more within each other, than `limits.elements` and `limits.nesting`.",
     "ENV181": "An XML file holds a text of more than ten million characters, or a name of more than fifty thousand.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
+    "ENV183": "A boundary, or a limit of a joint, is too large to be computed with.",
     # What a translation does not replace.
     "ENV190": "A file that is no env file, robot file or query, or none of the scene that is replaced, is kept.",
     # Text files that are doubtful.
@@ -178,6 +179,7 @@ CATALOGUE: dict[str, str] = {
     # What is written for MuJoCo.
     "MJC401": "MuJoCo refuses a model.",
     "MJC402": "MuJoCo warns of a model, and Python is told that warnings are errors.",
+    "MJC403": "A chain has more links than MuJoCo's XML parser reads within each other.",
     "MJC410": "A loop that closes by a slide stays open in the simulation.",
     "MJC411": "A free base gets no actuator.",
     "MJC412": "An attribute of the environment concerns the planner, and is not written.",
@@ -225,6 +227,8 @@ CATALOGUE: dict[str, str] = {
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
+    "CFG536": "The file's PositionRes is so small that edges would take more checks than end.",
+    "CFG537": "An edge is so long that it would take more checks than end.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",

@@ -21,14 +21,15 @@ from .formats.reading import read_scene
 from .formats.robot import read_robot
 from .formats.source import read_source
 from .formats.xml_parsing import parse_xml
+from .geometry.bounded import bounded
 from .geometry.loading import READABLE, load_mesh
-from .geometry.repair import refuse_work, repair_diagnostics, repaired
+from .geometry.repair import repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
 from .kinematics import RobotKinematics
 from .model import Body, Environment, MultiBody, MultiBodyKind
 from .opening import open_regular
 from .options import Options, PathArgument
-from .work import TooMuchWorkError, Work
+from .work import Work
 
 # What is skipped is never tried in another way: comments could end at each of the marks behind their own.
 _ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
@@ -208,8 +209,6 @@ def _lint_robot(path: str, options: Options, log: DiagnosticLog) -> None:
 def _lint_mesh(path: Path, options: Options, log: DiagnosticLog, body: Body | None = None) -> None:
     mesh = load_mesh(path, log, options.limits)
     subject, span = (body.filename, body.span) if body else (str(path), None)
-    try:
+    with bounded(options.limits, log, subject, span):
         result = repaired(mesh, Work(options.limits.mesh_work))
-    except TooMuchWorkError:
-        refuse_work(options.limits, log, subject, span)
     repair_diagnostics(mesh, result, log, subject=subject, span=span)

@@ -255,6 +255,7 @@ class Resolution:
         position_factor: `PositionResFactor`.
         orientation: `Orientation`, radians.
         time, rd: `TimeRes`, `RDRes`.
+        span: Where `position` stands.
     """
 
     position: float | None = None
@@ -262,6 +263,7 @@ class Resolution:
     orientation: float | None = None
     time: float | None = None
     rd: float | None = None
+    span: Span | None = _span()
 
 
 @dataclass(frozen=True, slots=True)

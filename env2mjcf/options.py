@@ -19,6 +19,10 @@ Engine = Literal["auto", "exact", "mujoco"]
 DialectName = Literal["A", "B", "C", "D", "E"]
 PathArgument = str | PathLike[str]
 
+LARGEST = 1e30
+"""Largest coordinate, in file units or metres, that is computed with: volumes and inertias of what is larger overflow,
+MuJoCo's own numbers end at 3e38, and planners do not end in a wider space."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -34,7 +38,8 @@ class Limits:
         polygon_work: Points looked at while polygons of one mesh are cut into triangles: a polygon that is not
             convex takes up to the square of its corners, or more.
         scene_elements: Triangles of all bodies of a scene, those of a mesh that several bodies have counted each time.
-        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way.
+        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way: about 25 kB of memory
+            each while MuJoCo compiles it, more where they have many corners.
         mesh_work: Comparisons of parts of one mesh while it is repaired and cut into convex pieces: about half a
             microsecond each.
         pairs: Pairs of bodies of a scene that may touch.
@@ -51,7 +56,7 @@ class Limits:
     polygon_corners: int = 10_000
     polygon_work: int = 20_000_000
     scene_elements: int = 500_000_000
-    scene_cells: int = 2_000_000
+    scene_cells: int = 200_000
     mesh_work: int = 500_000_000
     pairs: int = 2_000_000
     rows: int = 5_000_000

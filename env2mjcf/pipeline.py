@@ -12,6 +12,7 @@ from .errors import Diagnostic, DiagnosticLog, GeometryError
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
 from .mjcf.compiler import Document, compile_mjcf
+from .mjcf.nesting import refuse_long_chains
 from .model import Environment
 from .names import dof_names
 from .options import Limits, Options, PathArgument
@@ -47,6 +48,9 @@ class Compiled:
 def compile_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Compiled:
     """Take a file through the whole pipeline."""
     environment = read_scene(path, options, log)
+    # What counts alone tell is told before the work on the geometry.
+    _check_pairs(environment, options, log)
+    refuse_long_chains(environment, log)
     assembly = assemble(scaled(environment, options.scale), options, log)
     return compile_assembly(environment, assembly, options, log)
 
@@ -60,13 +64,13 @@ def compile_assembly(environment: Environment, assembly: Assembly, options: Opti
     space = configuration_space(assembly, options)
     robots = [Robot(r.kinematics, r.names) for r in assembly.robots]
     obstacles = [p.name for p in assembly.obstacles]
-    _check_pairs(sum(len(r.links) for r in robots), len(obstacles), environment, options, log)
     pairs = pair_table(robots, obstacles, options, environment.planner_rules)
     document = compile_mjcf(assembly, space, pairs, options, log)
     return Compiled(environment, assembly, space, pairs, document, options, tuple(log))
 
 
-def _check_pairs(links: int, obstacles: int, environment: Environment, options: Options, log: DiagnosticLog) -> None:
+def _check_pairs(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    links, obstacles = (sum(len(m.bodies) for m in group) for group in (environment.robots, environment.obstacles))
     count, at_most = links * obstacles + links * (links - 1) // 2, options.limits.pairs
     if count > at_most:
         log.fail(

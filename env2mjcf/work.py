@@ -11,11 +11,13 @@ COSTLY = 10
 class TooMuchWorkError(Exception):
     """More steps were asked for than are allowed.
 
-    Attributes:
-        polygon: Index of the one that they were asked for, where it is one.
+    Args:
+        part: Index of the part of the mesh that they were asked for, where it is one.
     """
 
-    polygon: int | None = None
+    def __init__(self, part: int = 0) -> None:
+        super().__init__(part)
+        self.part = part
 
 
 class Work:
@@ -29,12 +31,12 @@ class Work:
         self.most = most
         self.done = 0
 
-    def spend(self, steps: int) -> None:
-        """Count steps that are about to be taken.
+    def spend(self, steps: int, part: int = 0) -> None:
+        """Count steps that are about to be taken, for a part of the mesh where they are for one.
 
         Raises:
             TooMuchWorkError: They are more than are left.
         """
         self.done += steps
         if self.done > self.most:
-            raise TooMuchWorkError
+            raise TooMuchWorkError(part)

@@ -166,7 +166,7 @@ def test_a_path_is_known_by_its_first_word() -> None:
 
 def test_what_is_written_has_the_header_that_the_newest_planner_compares_and_reads_back_exactly() -> None:
     rng = np.random.default_rng(3)
-    numbers = [*rng.normal(size=(20, 5)).tolist(), [0.1, -0.0, 1e-300, 5e-324, 1.7976931348623157e99]]
+    numbers = [*rng.normal(size=(20, 5)).tolist(), [0.1, -0.0, 1e-300, 5e-324, 1.7976931348623157e29]]
     for version, index in itertools.product((2012, TURNS), (None, 0)):
         text = path_text(numbers, version, index)
         assert text.splitlines()[:3] == [f"VIZMO_PATH_FILE   Path Version {version}", "1", "21"]

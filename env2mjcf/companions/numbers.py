@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 from ..dialects import begins_with_robot
 from ..errors import DiagnosticLog, FormatError, Span
 from ..formats.path import ALL_ROBOTS
-from ..formats.rows import LARGEST
 from ..model import Dialect
-from ..options import PathArgument
+from ..options import LARGEST, PathArgument
 from ..simulation.scene import Scene
 from ..space import ConfigurationSpace
 from ..transforms import Array

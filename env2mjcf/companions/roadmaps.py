@@ -14,9 +14,8 @@ from ..arguments import whole
 from ..errors import Diagnostic, DiagnosticLog
 from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
-from ..formats.rows import LARGEST
 from ..formats.source import Source, read_source
-from ..options import Limits, PathArgument
+from ..options import LARGEST, Limits, PathArgument
 from ..simulation.scene import Scene
 from ..transforms import Array
 from .adjacency import undirected

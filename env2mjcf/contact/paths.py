@@ -31,6 +31,11 @@ class EdgeSteps:
         self._space = space
         self._motion = MotionBounds(assembly, space)
 
+    @property
+    def usual(self) -> float:
+        """The step in metres where nothing is asked for, and the file has none: 0.01 extent."""
+        return _DEFAULT_RESOLUTION * self._assembly.extent
+
     def resolution(self, resolution: float | None) -> float:
         """Return the step in metres: what was asked for, else the file's PositionRes, else 0.01 extent.
 
@@ -39,7 +44,7 @@ class EdgeSteps:
         """
         if resolution is None:
             of_file = self._assembly.environment.resolution.position
-            return of_file if of_file else _DEFAULT_RESOLUTION * self._assembly.extent
+            return of_file if of_file else self.usual
         if not 0 < resolution < float("inf"):
             raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
         return resolution
@@ -48,7 +53,8 @@ class EdgeSteps:
         """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""
         moved = self._motion.links(start, delta).max(axis=1, initial=0.0)
         # What fits into no integer would come out negative, and pass for a short way.
-        steps = np.minimum(np.ceil(moved / self.resolution(resolution)), _MOST_STEPS)
+        with np.errstate(over="ignore"):
+            steps = np.minimum(np.ceil(moved / self.resolution(resolution)), _MOST_STEPS)
         return np.maximum(2, steps.astype(np.int64) + 1)
 
     def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiagnosticLog, FormatError
+from ..options import LARGEST
 from ..transforms import Array
-from .rows import LARGEST
 
 # A header of version 3.0 is one of 2.0 in UTF-8, which only names of fields need.
 _HEADERS = {

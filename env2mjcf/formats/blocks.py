@@ -10,7 +10,7 @@ from typing import TypeVar
 from ..dialects import RULES, DialectRules
 from ..errors import FormatError, Span
 from ..model import Body, Comment, DHForm, DHParameters, Dialect, MultiBodyKind, Pose
-from ..options import Limits
+from ..options import LARGEST, Limits
 from .lexer import Scanner, parse_number
 
 T = TypeVar("T")
@@ -78,12 +78,29 @@ def read_color(scan: Scanner) -> tuple[float, float, float, float]:
     return r, g, b, a
 
 
+def read_coordinate(scan: Scanner, what: str) -> float:
+    """Read a number that is small enough to be computed with."""
+    start = scan.position
+    value = scan.number(what)
+    check_coordinate(scan, value, what, scan.span(start))
+    return value
+
+
+def check_coordinate(scan: Scanner, value: float, what: str, span: Span) -> None:
+    """Refuse a number that is too large to be computed with."""
+    if abs(value) > LARGEST:
+        scan.fail(
+            "ENV183", f"{what} is {value:g}; at most {LARGEST:g} can be computed with",
+            hint="is the file damaged? What has no end is wide enough with 1e6", span=span,
+        )  # fmt: skip
+
+
 def read_range(scan: Scanner, what: str) -> tuple[float, float]:
     """Read `lower:upper`."""
     start = scan.position
-    lower = scan.number(f"lower end of {what}")
+    lower = read_coordinate(scan, f"lower end of {what}")
     scan.punctuation(":", f"between the two ends of {what}")
-    upper = scan.number(f"upper end of {what}")
+    upper = read_coordinate(scan, f"upper end of {what}")
     if lower > upper:
         scan.fail(
             "ENV114", f"{what} {lower:g}:{upper:g} is empty; expected lower:upper",

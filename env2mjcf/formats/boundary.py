@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import FormatError, Span
 from ..model import Boundary, BoundaryShape
-from .blocks import read_range
+from .blocks import read_coordinate, read_range
 from .lexer import Scanner
 
 SHAPES = {s.value: s for s in BoundaryShape}
@@ -66,13 +66,13 @@ def _range_follows(scan: Scanner, brackets: bool) -> bool:
 
 
 def _read_ball(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) -> Boundary:
-    center = [scan.number("x of the centre"), scan.number("y of the centre")]
+    center = [read_coordinate(scan, "x of the centre"), read_coordinate(scan, "y of the centre")]
     if shape is BoundaryShape.SPHERE and scan.next_is_number():
-        center.append(scan.number("z of the centre"))
+        center.append(read_coordinate(scan, "z of the centre"))
     if brackets:
         scan.punctuation(";", "before the radius")
     at = scan.position
-    radius = scan.number("radius")
+    radius = read_coordinate(scan, "radius")
     if radius <= 0:
         scan.fail(
             "ENV119", f"radius {radius:g}; expected a positive number", hint="write the radius behind the centre",

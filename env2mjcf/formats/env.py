@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FormatError
@@ -76,17 +77,19 @@ def _check_header(scan: Scanner) -> None:
 def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
     scan.keyword({"Boundary": None}, "tag")
     boundary = read_boundary(scan)
-    resolution: dict[str, float] = {}
+    resolution = Resolution()
     while True:
         start = scan.position
         name = scan.keyword(_HEADER_TAGS, "tag")
         if name is None:
-            return boundary, Resolution(**resolution)
+            return boundary, resolution
         value = scan.number(name)
         if name != "position_factor" and value <= 0:
             scan.log.info("ENV306", name, f"{value:g}: the planner computes a step of its own", span=scan.span(start))
             continue
-        resolution[name] = value * math.pi if name == "orientation" else value
+        resolution = replace(resolution, **{name: value * math.pi if name == "orientation" else value})
+        if name == "position":
+            resolution = replace(resolution, span=scan.span(start))
 
 
 def _read_multibodies(scan: Scanner, grammar: Grammar) -> tuple[tuple[MultiBody, ...], int]:

@@ -175,7 +175,7 @@ def faces_of(
             vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], Work(limits.polygon_work)
         )
     except TooMuchWorkError as stopped:
-        worst = int(kept[stopped.polygon or 0])
+        worst = int(kept[stopped.part])
         log.fail(
             GeometryError,
             "GEO270",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..work import TooMuchWorkError, Work
+from ..work import Work
 
 Vectors = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -33,7 +33,7 @@ def triangulate(
         each cut as a fan.
 
     Raises:
-        TooMuchWorkError: More points would have to be looked at; it names the polygon.
+        TooMuchWorkError: More points would have to be looked at; its part is the polygon.
     """
     work = work or Work()
     first_corner = np.cumsum(counts) - counts
@@ -48,15 +48,12 @@ def triangulate(
             continue
         flat = _flattened(vertices[polygons])
         for row in np.flatnonzero(~_convex(flat)).tolist():
-            try:
-                triples, whole = _clip_ears(flat[row], work)
-            except TooMuchWorkError as stopped:
-                stopped.polygon = int(which[row])
-                raise
-            start = int(first_face[which[row]])
+            polygon = int(which[row])
+            triples, whole = _clip_ears(flat[row], work, polygon)
+            start = int(first_face[polygon])
             faces[start : start + n - 2] = polygons[row][triples]
             if not whole:
-                crossing.append(int(which[row]))
+                crossing.append(polygon)
     return faces, sorted(crossing)
 
 
@@ -95,13 +92,13 @@ def _convex(flat: Vectors) -> NDArray[np.bool_]:
     return (cross > _FLAT).all(axis=1) & (turn < 3 * np.pi)
 
 
-def _clip_ears(points: Vectors, work: Work) -> tuple[Indices, bool]:
-    """Cut one (n, 2) polygon; return (n - 2, 3) positions, and False where it crosses itself."""
+def _clip_ears(points: Vectors, work: Work, polygon: int) -> tuple[Indices, bool]:
+    """Cut one (n, 2) polygon, of this index; return (n - 2, 3) positions, and False where it crosses itself."""
     ring = list(range(len(points)))
     triples: list[tuple[int, int, int]] = []
     at, misses = 0, 0
     while len(ring) > 3 and misses < len(ring):
-        work.spend(len(ring))
+        work.spend(len(ring), polygon)
         ear = (ring[at - 1], ring[at], ring[(at + 1) % len(ring)])
         if _is_ear(points, ear, ring):
             triples.append(ear)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import FormatError, did_you_mean
 from ..model import Boundary, BoundaryShape, PlannerRules
+from .blocks import read_coordinate
 from .lexer import Scanner
 from .xml import Node
 
@@ -201,7 +202,8 @@ def _read_older_boundary(environment: Node) -> Boundary | None:
 
 
 def _axis(parameter: Node) -> tuple[float, float]:
-    lower, upper = parameter.number("min"), parameter.number("max")
+    lower = parameter.read("min", lambda scan: read_coordinate(scan, "min of the boundary"))
+    upper = parameter.read("max", lambda scan: read_coordinate(scan, "max of the boundary"))
     if lower > upper:
         parameter.fail(
             "ENV114", f"the boundary {lower:g}:{upper:g} is empty; expected min below max",

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..dofs import build_tree, degrees_of_freedom
-from ..errors import DiagnosticLog, FormatError
+from ..errors import DiagnosticLog, FormatError, Span
 from ..model import Dialect, Environment, MultiBody, Task
 from ..options import Limits, Options, PathArgument
 from . import xml_scene
 from .detect import detect, is_xml
 from .env import read_env
 from .lexer import Scanner
-from .problem import Problem, ProblemRobot, ProblemTask, read_problem
+from .problem import Problem, ProblemTask, read_problem
 from .query import read_query
 from .robot import read_robot
 from .rows import split_row
@@ -25,6 +26,15 @@ from .xml import Node
 from .xml_parsing import parse_xml
 
 _PROBLEM_TAGS = ("motionplanning", "motion_planning", "mpproblem", "problem")
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """A robot file, the robot's label, and where a problem names it."""
+
+    path: PathArgument
+    label: str = ""
+    span: Span | None = None
 
 
 def read(path: PathArgument, **options: Any) -> Environment:
@@ -62,26 +72,21 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
             environment = _xml_environment(root, options)
     else:
         environment = _text_environment(source, options, log)
-    robots = [] if problem is None else [_problem_robot(r, source, options, log) for r in problem.robots]
     first_robot = sum(m.moves for m in environment.multibodies)
-    robots += [_robot_file(read_source(name, log, options.limits), options, log) for name in options.robots]
-    environment = dataclasses.replace(environment, multibodies=(*environment.multibodies, *robots))
-    _check_limits(environment, options.limits, log)
+    environment = _with_robots(environment, _robots_named(problem, source, options, log), options, log)
     if not environment.robots:
         log.info(
             "ENV310", environment.name, "the scene has no robot",
             hint="give a robot file with robots=[...] (--robots)",
         )  # fmt: skip
     tasks = _tasks(environment, problem, first_robot, options, log)
-    sources = _sources(source, environment, robots, options)
+    sources = _sources(source, environment, options)
     return dataclasses.replace(environment, tasks=tasks, path=source.path, sources=sources, diagnostics=tuple(log))
 
 
-def _sources(
-    source: Source, environment: Environment, robots: Sequence[MultiBody], options: Options
-) -> tuple[str, ...]:
+def _sources(source: Source, environment: Environment, options: Options) -> tuple[str, ...]:
     # The env file that a problem names is another than the problem.
-    names = (source.path, environment.path, *(r.robot_file for r in robots), options.query)
+    names = (source.path, environment.path, *(m.robot_file for m in environment.multibodies), options.query)
     return tuple(dict.fromkeys(os.fsdecode(name) for name in names if name))
 
 
@@ -99,19 +104,6 @@ def _text_environment(source: Source, options: Options, log: DiagnosticLog) -> E
 def _check_semantics(source: Source, dialect: Dialect, options: Options) -> None:
     if options.semantics == "page" and dialect is not Dialect.A:
         raise ValueError(f"semantics='page' concerns dialect A only; {source.path} is dialect {dialect}")
-
-
-def _check_limits(environment: Environment, limits: Limits, log: DiagnosticLog) -> None:
-    """Refuse a scene that is larger than `limits` once its robots are added."""
-    for what, found, at_most in (
-        ("bodies", sum(len(m.bodies) for m in environment.multibodies), limits.bodies),
-        ("connections", sum(len(m.connections) for m in environment.multibodies), limits.connections),
-    ):
-        if found > at_most:
-            log.fail(
-                FormatError, "ENV110", environment.path, f"the scene has {found} {what}; at most {at_most} are read",
-                hint=Limits.hint(what),
-            )  # fmt: skip
 
 
 def _xml_environment(root: Node, options: Options) -> Environment:
@@ -138,7 +130,8 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
     if problem.filename is None:
         environment = xml_scene.read_environment(node)
     else:
-        inner = _read_beside(source, problem.filename, node, options, log)
+        path, named_at = _beside(source, problem.filename, node, options, log)
+        inner = read_source(path, log, options.limits, named_at, regular=True)
         if is_xml(inner):
             environment = _xml_environment(parse_xml(inner, log), options)
         else:
@@ -149,12 +142,64 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
     )
 
 
-def _problem_robot(robot: ProblemRobot, source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
-    read = _robot_file(_read_beside(source, robot.filename, robot.node, options, log), options, log)
-    return dataclasses.replace(read, label=robot.label or read.label)
+def _robots_named(problem: Problem | None, source: Source, options: Options, log: DiagnosticLog) -> Iterator[_Named]:
+    for robot in () if problem is None else problem.robots:
+        path, span = _beside(source, robot.filename, robot.node, options, log)
+        yield _Named(path, robot.label, span)
+    for path in options.robots:
+        yield _Named(path)
 
 
-def _robot_file(source: Source, options: Options, log: DiagnosticLog) -> MultiBody:
+def _with_robots(
+    environment: Environment, named: Iterable[_Named], options: Options, log: DiagnosticLog
+) -> Environment:
+    """Add robots, each file read once however often it is named, until the scene is larger than the limits."""
+    read: dict[str, MultiBody] = {}
+    multibodies: list[MultiBody] = []
+    size = _Size(environment.path, options.limits, log)
+    for multibody in environment.multibodies:
+        size.add(multibody)
+    for robot in named:
+        path = os.fspath(robot.path)
+        place = path if "\0" in path else os.path.realpath(path)
+        if place not in read:
+            # What the user names may be a pipe.
+            named_by_file = robot.span is not None
+            found = read_source(path, log, options.limits, robot.span, regular=named_by_file)
+            read[place] = _robot_file(found, log)
+        # One of its own each time, because robots are told apart by identity.
+        multibodies.append(dataclasses.replace(read[place], label=robot.label or read[place].label))
+        size.add(multibodies[-1])
+    return dataclasses.replace(environment, multibodies=(*environment.multibodies, *multibodies))
+
+
+class _Size:
+    """Counts what a scene has, and refuses one that is larger than its limits."""
+
+    def __init__(self, path: str, limits: Limits, log: DiagnosticLog) -> None:
+        self._path, self._limits, self._log = path, limits, log
+        self._bodies = self._connections = 0
+
+    def add(self, multibody: MultiBody) -> None:
+        """Count one more multibody.
+
+        Raises:
+            FormatError: Now there are too many bodies, or connections.
+        """
+        self._bodies += len(multibody.bodies)
+        self._connections += len(multibody.connections)
+        self._check("bodies", self._bodies, self._limits.bodies)
+        self._check("connections", self._connections, self._limits.connections)
+
+    def _check(self, what: str, found: int, at_most: int) -> None:
+        if found > at_most:
+            self._log.fail(
+                FormatError, "ENV110", self._path, f"the scene has {found} {what} or more; at most {at_most} are read",
+                hint=Limits.hint(what),
+            )  # fmt: skip
+
+
+def _robot_file(source: Source, log: DiagnosticLog) -> MultiBody:
     if not is_xml(source):
         return read_robot(Scanner(source, log))
     root = parse_xml(source, log)
@@ -163,8 +208,8 @@ def _robot_file(source: Source, options: Options, log: DiagnosticLog) -> MultiBo
     return xml_scene.read_robot(root)
 
 
-def _read_beside(source: Source, name: str, node: Node, options: Options, log: DiagnosticLog) -> Source:
-    """Read a file that a problem names, which lies in its folder unless `allow_outside`."""
+def _beside(source: Source, name: str, node: Node, options: Options, log: DiagnosticLog) -> tuple[Path, Span]:
+    """Return a file that a problem names, and where; it lies in the problem's folder unless `allow_outside`."""
     named_at = node.span_of("filename" if node.get("filename") else "input_env")
     folder = Path(source.path).parent
     path = folder / name
@@ -173,7 +218,7 @@ def _read_beside(source: Source, name: str, node: Node, options: Options, log: D
             FormatError, "ENV150", name, f"{name} lies outside the folder of {source.path}; expected a file in it",
             hint="allow it with allow_outside=True (--allow-outside)", span=named_at,
         )  # fmt: skip
-    return read_source(path, log, options.limits, named_at, regular=True)
+    return path, named_at
 
 
 def _inside(path: Path, folder: Path) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from ..errors import DiagnosticLog, FormatError, Span
-from ..options import Limits
+from ..options import LARGEST, Limits
 from .lexer import number_hint, parse_number
 from .source import Source
 
@@ -16,8 +16,6 @@ _WORD = re.compile(r"\S+")
 _COMMENT = re.compile(r"#|//")
 # Dialect A's InfoCfg wrote three numbers behind some configurations.
 _LEGACY_INFO_FIELDS = 3
-LARGEST = 1e100
-"""Larger numbers are no coordinates: they overflow as soon as they are squared."""
 
 
 class Extra(StrEnum):

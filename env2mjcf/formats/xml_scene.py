@@ -63,6 +63,8 @@ def with_environment_attributes(environment: Environment, node: Node) -> Environ
         if value > 0:
             value = value * _GRAMMAR.rules.configuration_angle if name == "orientation" else value
             resolution = replace(resolution, **{name: value})
+            if name == "position":
+                resolution = replace(resolution, span=node.span_of(attribute))
     kept = tuple(sorted((k, v) for k, v in node.attributes.items() if k not in ("filename", "input_env")))
     return replace(environment, resolution=resolution, attributes=(*environment.attributes, *kept))
 

@@ -13,16 +13,17 @@ from ..errors import ConversionError, DiagnosticLog, GeometryError
 from ..kinematics import RobotKinematics
 from ..model import Body, Environment, JointType, MultiBody, Recentring
 from ..names import body_names
-from ..options import Limits, Options
+from ..options import LARGEST, Limits, Options
 from ..transforms import Array
-from ..work import TooMuchWorkError, Work
+from ..work import Work
 from .analysis import Analysis
+from .bounded import bounded
 from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
-from .loading import LARGEST, load_mesh
+from .loading import load_mesh
 from .mesh import Mesh
-from .repair import Repaired, refuse_work, repair_diagnostics, repaired
+from .repair import Repaired, repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 
@@ -237,18 +238,14 @@ class _Meshes:
 
     def _repaired(self, mesh: Mesh, body: Body) -> Repaired:
         work = self._work[mesh] = Work(self._options.limits.mesh_work)
-        try:
+        with bounded(self._options.limits, self._log, body.filename, body.span):
             return repaired(mesh, work)
-        except TooMuchWorkError:
-            refuse_work(self._options.limits, self._log, body.filename, body.span)
 
     def _shape(self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body) -> None:
         strategy, log, cache = self._options.collision, self._log, self._cache
         work = self._work[mesh]
-        try:
+        with bounded(self._options.limits, log, body.filename, body.span):
             shape = collision_shape(mesh, analysis, strategy, thickness, log, body.filename, body.span, cache, work)
-        except TooMuchWorkError:
-            refuse_work(self._options.limits, log, body.filename, body.span)
         self._shapes[mesh] = shape
         self._certificates[mesh] = proof = certificate(shape, thickness, cache, log)
         if shape.strategy == "coacd":

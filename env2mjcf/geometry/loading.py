@@ -17,7 +17,7 @@ from ..formats.mesh_text import MeshArrays
 from ..formats.obj import read_obj
 from ..formats.source import read_at_most, wide_encoding
 from ..opening import open_regular
-from ..options import Limits
+from ..options import LARGEST, Limits
 from .mesh import Mesh
 
 _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] = {
@@ -28,9 +28,6 @@ _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] =
 
 # Of what trimesh reads: formats that are one self-contained file of triangles.
 _THROUGH_TRIMESH = (".stl", ".ply", ".off", ".glb")
-
-# Volumes and inertias of larger meshes overflow; MuJoCo's own numbers end at 3e38.
-LARGEST = 1e30
 
 READABLE = (*_READERS, *_THROUGH_TRIMESH)
 

@@ -19,6 +19,9 @@ LEAST_WIDTH = 1e-7
 
 _LEAST_AREA = 2e-14
 
+# Distances from corners to edges that are computed at once.
+_BLOCK = 2_000_000
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexPiece:
@@ -140,29 +143,37 @@ def _surfaces(local: Floats, thickness: float) -> Floats:
     return 2 * base + thickness * np.linalg.norm(following - local, axis=2).sum(axis=1)
 
 
-def _across(local: Floats, normals: Floats) -> Floats:
-    """Return (g, k, k): how far each corner lies inside of each edge's line."""
+def _widths(local: Floats, normals: Floats) -> Floats:
+    """Return how far the farthest corner lies inside of each edge's line, (g, k)."""
     along = np.roll(local, -1, axis=1) - local
     inside = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
-    return np.einsum("gej,gvj->gev", inside, local) - np.einsum("gej,gej->ge", inside, local)[:, :, None]
+    out = np.empty(local.shape[:2])
+    # Each corner with each edge: for a polygon of thousands too many to be held at once.
+    step = max(1, _BLOCK // (local.shape[0] * local.shape[1]))
+    for i in range(0, local.shape[1], step):
+        part = inside[:, i : i + step]
+        across = (
+            np.einsum("gej,gvj->gev", part, local) - np.einsum("gej,gej->ge", part, local[:, i : i + step])[..., None]
+        )
+        out[:, i : i + step] = across.max(axis=2)
+    return out
 
 
 def too_narrow(local: Floats, normals: Floats, thickness: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Tell which polygons (g, k, 3) MuJoCo cannot hold as they are, (g,)."""
     # A convex polygon is narrowest square to one of its edges.
     out = np.empty(len(local), dtype=np.bool_)
-    step = max(1, 2_000_000 // local.shape[1] ** 2)
+    step = max(1, _BLOCK // local.shape[1] ** 2)
     for i in range(0, len(local), step):
         part = local[i : i + step]
-        width = _across(part, normals[i : i + step]).max(axis=2).min(axis=1)
+        width = _widths(part, normals[i : i + step]).min(axis=1)
         out[i : i + step] = width < _least_width(np.ptp(part, axis=1).max(axis=1), thickness)
     return out
 
 
 def _widened(local: Floats, normal: Floats, thickness: float) -> Floats:
     """Return the corners (4, 3) of a rectangle about a narrow polygon that is wide enough in both directions."""
-    across = _across(local[None], normal[None])[0]
-    edge = int(np.argmin(across.max(axis=1)))
+    edge = int(np.argmin(_widths(local[None], normal[None])[0]))
     along = np.roll(local, -1, axis=0)[edge] - local[edge]
     along /= np.linalg.norm(along)
     axes = np.stack([along, np.cross(normal, along)])

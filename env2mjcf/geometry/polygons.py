@@ -13,6 +13,8 @@ PARALLEL = 1.0 - 1e-12
 
 # How far reflex a corner may be, in units of the tolerance: rounding only, since many in a row add up.
 _STRAIGHT = 1e-3
+# To join larger polygons, and to take hulls of them in MuJoCo, costs time with the square of their corners.
+_MOST_CORNERS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,8 @@ class _Merger:
         """Remove the edge a-b between the polygons of two triangles, if one convex polygon is left."""
         left, right = self._find(left), self._find(right)
         if left == right:
+            return
+        if len(self._loops[left]) + len(self._loops[right]) > _MOST_CORNERS:
             return
         joined = _joined(self._loops[left], self._loops[right], a, b)
         if joined is None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NoReturn
 
 import numpy as np
 
 from ..errors import DiagnosticLog, GeometryError, Span
-from ..options import Limits
 from ..work import COSTLY, Work
 from .analysis import Analysis, analyse, mesh_diagnostics
 from .folds import unfolded
@@ -190,14 +188,3 @@ def _near(segments: Floats, points: Floats, tolerance: float, work: Work) -> tup
     jobs = Jobs(first, first + 1, np.eye(3)[None], np.zeros((1, 3)), first)
     _, segment, point = Search(trees, jobs, np.array([np.inf]), tolerance).within(tolerance, work).T
     return segment, point - len(segments)
-
-
-def refuse_work(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None) -> NoReturn:
-    """Raise a `GeometryError` about a mesh that takes too much work."""
-    log.fail(
-        GeometryError, "GEO273", subject,
-        f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its parts "
-        "would have to be compared",
-        hint=f"remove parts that overlap, choose collision='hull' (--collision hull), or {Limits.hint('mesh_work')}",
-        span=span,
-    )  # fmt: skip

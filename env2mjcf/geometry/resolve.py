@@ -10,6 +10,9 @@ from ..errors import DiagnosticLog, GeometryError, Span, did_you_mean
 from ..model import Environment
 from ..options import Options
 
+# Missing names for which the nearest one is looked for.
+_GUESSES = 3
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -93,6 +96,9 @@ class _Finder:
         self._real_folders = [os.path.realpath(f) for f in folders]
         self._allow_outside = allow_outside
         self._log = log
+        self._listings: dict[Path, list[str]] = {}
+        self._folded: dict[Path, dict[str, str]] = {}
+        self._guesses = _GUESSES
 
     def find(self, name: str, span: Span | None) -> Path | Problem:
         """Return where a file is, or why it cannot be used."""
@@ -128,8 +134,31 @@ class _Finder:
         return next((f for f in files if self._inside(f)), files[0] if files else None)
 
     def _any_case(self, name: str) -> Path | None:
-        matches = (_match_case(folder, name) for folder in self._folders if not PurePosixPath(name).is_absolute())
+        matches = (self._match_case(folder, name) for folder in self._folders if not PurePosixPath(name).is_absolute())
         return next((m for m in matches if m is not None and self._inside(m)), None)
+
+    def _match_case(self, folder: Path, name: str) -> Path | None:
+        """Return the file that a name means when case is ignored; the first in code point order where several fit."""
+        at = folder
+        for part in PurePosixPath(name).parts:
+            exact = part == ".." or os.path.lexists(at / part)
+            at /= part if exact else self._any_case_of(at, part)
+        return at if os.path.isfile(at) else None
+
+    def _any_case_of(self, folder: Path, name: str) -> str:
+        if folder not in self._folded:
+            # Backwards, so that the first of several stays.
+            self._folded[folder] = {x.lower(): x for x in reversed(self._listing(folder))}
+        return self._folded[folder].get(name.lower(), name)
+
+    def _listing(self, folder: Path) -> list[str]:
+        """Return what is in a folder, in order; read once, however many names are looked for in it."""
+        if folder not in self._listings:
+            try:
+                self._listings[folder] = sorted(os.listdir(folder))
+            except OSError:
+                self._listings[folder] = []
+        return self._listings[folder]
 
     def _inside(self, path: Path) -> bool:
         if self._allow_outside:
@@ -155,25 +184,14 @@ class _Finder:
                 kind = "folder" if candidate.is_dir() else "broken link or a special file"
                 return Problem("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
         places = ", ".join(repr(str(c)) for c in candidates)
-        # Folders outside are not listed: an error message must not show what they hold.
-        near = [x for c in candidates if self._inside(c.parent) for x in _listing(c.parent)]
-        hint = (
-            did_you_mean(PurePosixPath(slashed).name, near) or "add the folder that holds it to mesh_dirs (--mesh-dirs)"
-        )
+        hint = self._guess(slashed, candidates) or "add the folder that holds it to mesh_dirs (--mesh-dirs)"
         return Problem("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
 
-
-def _match_case(folder: Path, name: str) -> Path | None:
-    """Return the file that a name means when case is ignored; the first in code point order where several fit."""
-    at = folder
-    for part in PurePosixPath(name).parts:
-        exact = part == ".." or os.path.lexists(at / part)
-        at /= part if exact else next((x for x in _listing(at) if x.lower() == part.lower()), part)
-    return at if os.path.isfile(at) else None
-
-
-def _listing(folder: Path) -> list[str]:
-    try:
-        return sorted(os.listdir(folder))
-    except OSError:
-        return []
+    def _guess(self, name: str, candidates: list[Path]) -> str:
+        """Return what a missing name may be a slip of: of the first few names, because each is compared with all."""
+        if self._guesses == 0:
+            return ""
+        self._guesses -= 1
+        # Folders outside are not listed: an error message must not show what they hold.
+        near = [x for c in candidates if self._inside(c.parent) for x in self._listing(c.parent)]
+        return did_you_mean(PurePosixPath(name).name, near)

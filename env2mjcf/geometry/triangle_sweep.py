@@ -50,7 +50,10 @@ def _swept(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> tup
     job = np.arange(len(jobs.a), dtype=np.int64)
     a, b = trees.roots[jobs.a], trees.roots[jobs.b]
     while True:
-        kept = _boxes_meet(trees, jobs, directions, window, job, a, b)
+        # For each push, all that two meshes have: too much to be looked at at once.
+        blocks = [slice(i, i + _BLOCK) for i in range(0, len(job), _BLOCK)]
+        parts = [_boxes_meet(trees, jobs, directions, window, job[s], a[s], b[s]) for s in blocks]
+        kept = np.concatenate([np.zeros(0, dtype=np.bool_), *parts])
         job, a, b = job[kept], a[kept], b[kept]
         if not (trees.children[a].any() or trees.children[b].any()):
             return job, trees.triangle[a], trees.triangle[b]

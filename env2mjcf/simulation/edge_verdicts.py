@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.paths import EdgeSteps
+from ..errors import DiagnosticLog, FormatError
 from ..forking import lasting
 from ..transforms import Array
 from .scene import Scene
@@ -90,7 +92,8 @@ class EdgeJudge:
         checked: (m,) which edges to look at; None for all.
 
     Raises:
-        ValueError: The resolution is not positive, or so small that the checks would not end.
+        FormatError: The file's resolution is so small, or an edge so long, that the checks would not end.
+        ValueError: The resolution that is given is not positive, or so small.
 
     Attributes:
         resolution: The greatest distance in metres that any point moves between two checks.
@@ -118,7 +121,11 @@ class EdgeJudge:
         starts, ends, owner = edges.pieces()
         kept = self.checked[owner]
         starts, ends, owner = starts[kept], ends[kept], owner[kept]
-        self._walk(starts, scene.space.difference(starts, ends), owner)
+        delta = scene.space.difference(starts, ends)
+        counts = self._steps.counts(starts, delta, self.resolution)
+        if counts.sum(dtype=np.float64) > _MOST_CHECKS:
+            self._refuse(starts, delta, owner, resolution)
+        self._walk(starts, delta, owner, counts)
         self.stepped = self.valid.copy()
         self.proved: NDArray[np.bool_] | None = None
         if certified:
@@ -159,11 +166,26 @@ class EdgeJudge:
         labels = [self._edges.labels[i] for i in np.flatnonzero(failed).tolist()]
         return Judge(self._scene, self._places[failed], labels)
 
-    def _walk(self, start: Array, delta: Array, owner: Indices) -> None:
-        """Check all edges at even steps, and note the first check of each that fails."""
-        counts = self._steps.counts(start, delta, self.resolution)
-        if counts.sum(dtype=np.float64) > _MOST_CHECKS:
-            raise ValueError(f"resolution is {self.resolution}; in such steps the edges would take too many checks")
+    def _refuse(self, start: Array, delta: Array, owner: Indices, given: float | None) -> NoReturn:
+        """Raise what is to blame for steps without end: the resolution that was given, the file's, or the edges."""
+        message = f"in steps of {self.resolution:g} m the edges would take too many checks"
+        if given is not None:
+            raise ValueError(f"resolution is {given}; {message}")
+        environment, log = self._scene.environment, DiagnosticLog()
+        counts = self._steps.counts(start, delta, self._steps.usual)
+        if counts.sum(dtype=np.float64) <= _MOST_CHECKS:
+            log.fail(
+                FormatError, "CFG536", "PositionRes", f"PositionRes {environment.resolution.position:g}: {message}",
+                hint="correct PositionRes, or give --resolution", span=environment.resolution.span,
+            )  # fmt: skip
+        longest = self._edges.labels[int(owner[np.argmax(counts)])]
+        log.fail(
+            FormatError, "CFG537", longest, f"{longest} is too long: {message}",
+            hint="is a number of its ends wrong? Else give --resolution",
+        )  # fmt: skip
+
+    def _walk(self, start: Array, delta: Array, owner: Indices, counts: Indices) -> None:
+        """Check all edges at even steps, `counts` of each, and note the first check of each that fails."""
         stops = np.cumsum(counts)
         whole = np.bincount(owner, counts, minlength=len(self.valid))
         passed = np.concatenate([[0], np.cumsum(whole)])
