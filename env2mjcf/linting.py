@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, GeometryError, Severity
+from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, FormatError, GeometryError, Severity
 from .formats import xml_scene
 from .formats.detect import is_robot_file, is_xml
 from .formats.lexer import Scanner
@@ -74,7 +74,8 @@ def lint(
     other meshes of the scene, and the other files, are still looked at.
 
     Args:
-        paths: Scenes, robot files, meshes, no pipes; folders are searched for `.env`, `.robot` and `.xml` files.
+        paths: Scenes, robot files, meshes, no pipes; folders are searched for `.env`, `.robot` and `.xml` files. Links
+            in them that lead out of them are not followed, unless `allow_outside`.
         options: How to read and load; `strict` is ignored, so that a warning does not end a file.
         progress: Show a progress bar on a terminal.
 
@@ -85,14 +86,14 @@ def lint(
     chosen = Options.from_keywords(
         {f.name: getattr(given, f.name) for f in dataclasses.fields(given)} | {"strict": False}
     )
-    files = _files(paths)
+    files = _files(paths, chosen)
     results: list[LintResult] = []
     seen: set[Diagnostic] = set()
     bar = tqdm(files, unit="file", delay=1, leave=False, disable=not (progress and sys.stderr.isatty()))
-    for path in bar:
-        kind = _kind(path)
+    for path, leads_out in bar:
+        kind = Kind.OTHER if leads_out else _kind(path)
         try:
-            found = dict.fromkeys(_lint_file(path, kind, chosen))
+            found = dict.fromkeys(_leads_out(path) if leads_out else _lint_file(path, kind, chosen))
         except Exception as error:
             error.add_note(f"while linting {path}")
             raise
@@ -103,23 +104,37 @@ def lint(
     return tuple(results)
 
 
-def _files(paths: Iterable[PathArgument]) -> list[str]:
-    """Return the files to look at, each once."""
-    files: dict[str, str] = {}
+def _files(paths: Iterable[PathArgument], options: Options) -> list[tuple[str, bool]]:
+    """Return the files to look at, each once, and whether each is a link that is not to be followed."""
+    files: dict[str, tuple[str, bool]] = {}
     for path in paths:
-        for file in sorted(_search(path)) if os.path.isdir(path) else [os.fspath(path)]:
-            files.setdefault(os.path.realpath(file), file)
+        for file in sorted(_search(path, options)) if os.path.isdir(path) else [(os.fspath(path), False)]:
+            files.setdefault(os.path.realpath(file[0]), file)
     return list(files.values())
 
 
-def _search(folder: PathArgument) -> Iterator[str]:
+def _search(folder: PathArgument, options: Options) -> Iterator[tuple[str, bool]]:
+    inside = Path(os.path.realpath(folder))
     for where, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]
         for name in names:
             path = os.path.normpath(os.path.join(where, name))
             extension = os.path.splitext(name)[1].lower()
-            if extension in (".env", ".robot") or (extension == ".xml" and _kind(path) is not Kind.OTHER):
-                yield path
+            if extension not in (".env", ".robot", ".xml"):
+                continue
+            leads_out = not options.allow_outside and not Path(os.path.realpath(path)).is_relative_to(inside)
+            if leads_out or extension != ".xml" or _kind(path) is not Kind.OTHER:
+                yield path, leads_out
+
+
+def _leads_out(path: str) -> Sequence[Diagnostic]:
+    try:
+        DiagnosticLog().fail(
+            FormatError, "ENV152", path, f"{path} is a link that leads out of the folder, and is not read",
+            hint="name the file itself, or allow it with allow_outside=True (--allow-outside)",
+        )  # fmt: skip
+    except FormatError as error:
+        return error.diagnostics
 
 
 def _kind(path: str) -> Kind:

@@ -83,6 +83,22 @@ class TestWhatIsLookedAt:
         assert (named.kind, codes(named)) == (Kind.OTHER, ["ENV132"])
         assert named.count(Severity.INFO) == 1
 
+    @pytest.mark.parametrize("name", ["a.env", "a.robot", "a.xml"])
+    def test_a_link_that_leads_out_of_a_folder_is_not_followed(self, name, folder):
+        (folder / "secret").write_text("the first word of this file would be quoted")
+        (folder / "scenes").mkdir()
+        (folder / "scenes" / "inside.env").write_text(scene("../cube.g", "../cube.g"))
+        (folder / "scenes" / "link.env").symlink_to("inside.env")
+        (folder / "scenes" / name).symlink_to("../secret")
+        first, *others = lint(["scenes"], Options(allow_outside=False))
+        assert (first.path, codes(first)) == (f"scenes/{name}", ["ENV152"])
+        assert [r.path for r in others] == ["scenes/inside.env"]
+        assert "secret" not in repr(first)
+        if name != "a.xml":  # of which other kinds are passed over
+            first, *_ = lint(["scenes"], Options(allow_outside=True))
+            assert first.path == f"scenes/{name}"
+            assert codes(first) != ["ENV152"]
+
     def test_a_file_named_twice_is_looked_at_once(self, folder):
         (folder / "a.env").write_text(scene())
         assert [r.path for r in lint(["a.env", ".", folder / "a.env"])] == ["a.env"]
