@@ -64,9 +64,9 @@ class TestRobotFiles:
         names: list[str] = []
         original = reading.read_source
 
-        def noted(path: env2mjcf.options.PathArgument, *rest: object) -> object:
+        def noted(path: env2mjcf.options.PathArgument, *rest: object, **keywords: object) -> object:
             names.append(os.path.basename(path))
-            return original(path, *rest)  # pyright: ignore[reportArgumentType]
+            return original(path, *rest, **keywords)  # pyright: ignore[reportArgumentType]
 
         monkeypatch.setattr(reading, "read_source", noted)
         return names

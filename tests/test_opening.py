@@ -91,7 +91,10 @@ def test_pipes_in_the_folder_that_is_written_to_are_not_waited_for(tmp_path: Pat
     for entry in (scene, other):
         assert run("convert", entry, out)[0] == 0
     np.save(tmp_path / "q.npy", np.zeros((2, 6)))
-    assert run("batch", scene, tmp_path / "q.npy", "-o", out / "v.npy")[0] == 0
+    status, said = run("batch", scene, tmp_path / "q.npy", "-o", out / "v.npy")
+    assert status == 3
+    assert "CFG509" in said
+    assert "v.npy.journal is no regular file" in said
 
 
 def test_the_user_may_name_a_pipe(tmp_path: Path) -> None:
