@@ -228,7 +228,7 @@ CATALOGUE: dict[str, str] = {
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
-    "CFG536": "The file's PositionRes is so small that edges would take more checks than end.",
+    "CFG536": "The file's PositionRes is too small to plan with, or for checks of edges to end.",
     "CFG537": "An edge is so long that it would take more checks than end.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",

@@ -120,7 +120,9 @@ class TestDistances:
         assert fault(lambda: env2mjcf.read(problem)).code == "ENV183"
 
     def test_the_largest_is_planned_in(self, folder: Path) -> None:
-        planning = pytest.importorskip("env2mjcf.planning")
+        pytest.importorskip("ompl", reason="planning needs the extra planning")
+        from env2mjcf import planning
+
         scene = load(folder, (BOX + "1\n" + ROBOT).replace("9", f"{LARGEST:g}"))
         goal = np.array([0, 0, 7.0, 0, 0, 0])
         assert planning.plan(scene, np.zeros(6), goal).solved
@@ -179,6 +181,30 @@ class TestSteps:
         path = self.path(folder, "1e12")
         assert main(["check", str(env), str(path), "--engine", "mujoco"]) == 3
         assert f"error CFG537: edge from configuration 1 to 2 ({path}:4) is too long" in capsys.readouterr().err
+
+    @pytest.mark.parametrize("engine", ["exact", "mujoco"])
+    def test_edges_of_an_array_take_no_memory_for_steps_without_end(self, folder: Path, engine: str) -> None:
+        if engine == "exact":
+            pytest.importorskip("numba", reason="the exact engine needs the extra fast")
+        scene = env2mjcf.load(write(folder, BOX + "1\n" + ROBOT), engine=engine)
+        ends = np.zeros((2, 6))
+        ends[1, 0] = 9
+        for ask in (scene.edge_in_collision, scene.edge_rows):
+            with pytest.raises(ValueError, match=r"1e-12; in such steps an edge has 9e\+12 configurations"):
+                ask(*ends, resolution=1e-12)
+        with pytest.raises(ValueError, match="resolution is 1e-12; in such steps"):
+            scene.check_path(ends, resolution=1e-12)
+
+    def test_a_resolution_that_nothing_can_be_planned_with_is_refused(
+        self, folder: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        pytest.importorskip("ompl", reason="planning needs the extra planning")
+        env = write(folder, (BOX + "1\n" + ROBOT).replace("Multibodies", "PositionRes 1e-12\nMultibodies"))
+        words = ["plan", str(env), "--query", str(write(folder, "0 0 0 0 0 0 0\n0 0 7 0 0 0 0\n", "a.query"))]
+        assert main([*words, "--engine", "mujoco"]) == 3
+        assert f"{env}:2:1: error CFG536: PositionRes 1e-12: planning takes steps" in capsys.readouterr().err
+        assert main([*words, "--engine", "mujoco", "--resolution", "1e-12"]) == 2
+        assert "resolution is 1e-12; expected at least" in capsys.readouterr().err
 
     def test_environments_of_xml_have_its_place_too(self, folder: Path) -> None:
         text = '<Environment positionRes="1e-12"></Environment>'

@@ -20,7 +20,13 @@ from env2mjcf.view import offscreen
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 
 
-@pytest.mark.parametrize("verb", ["convert", "batch", "play", "plan"])
+@pytest.mark.parametrize(
+    "verb",
+    [
+        "convert", "batch", pytest.param("plan", marks=needs("planning")),
+        pytest.param("play", marks=[needs("view"), pytest.mark.skipif(offscreen.backend() is None, reason="no GL")]),
+    ],
+)  # fmt: skip
 def test_a_verb_that_is_interrupted_leaves_nothing(verb: str, tmp_path: Path) -> None:
     interrupting.prepare(tmp_path)
     tally = interrupting.interrupt_randomly(verb, tmp_path, count=2, seed=0)

@@ -16,6 +16,8 @@ from .types import Contact, PathReport
 # Without a resolution in the file, a step is this fraction of the extent.
 _DEFAULT_RESOLUTION = 0.01
 _MOST_STEPS = 1e15
+# Of one edge, whose configurations are made at once.
+_MOST_ROWS = 10_000_000
 
 
 class EdgeSteps:
@@ -57,10 +59,25 @@ class EdgeSteps:
             steps = np.minimum(np.ceil(moved / self.resolution(resolution)), _MOST_STEPS)
         return np.maximum(2, steps.astype(np.int64) + 1)
 
+    def bounded_counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
+        """Return the same, of edges that can be checked.
+
+        Raises:
+            ValueError: An edge has more than ten million configurations.
+        """
+        counts = self.counts(start, delta, resolution)
+        most = int(counts.max(initial=0))
+        if most > _MOST_ROWS:
+            step = self.resolution(resolution)
+            raise ValueError(
+                f"resolution is {step:g}; in such steps an edge has {most:g} configurations, more than {_MOST_ROWS:g}"
+            )
+        return counts
+
     def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:
         """Return the configurations to be checked on an edge, both ends included, (n, dim)."""
         start, delta = self._space.check(q0), self._space.difference(q0, q1)
-        count = int(self.counts(start[None], delta[None], resolution)[0])
+        count = int(self.bounded_counts(start[None], delta[None], resolution)[0])
         return start + np.linspace(0.0, 1.0, count)[:, None] * delta
 
 

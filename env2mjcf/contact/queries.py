@@ -131,7 +131,7 @@ class ContactQueries:
         exact = self._chosen(None)
         if self._always:
             return np.ones(len(start), dtype=bool)
-        steps = self.steps.counts(start, delta, resolution)
+        steps = self.steps.bounded_counts(start, delta, resolution)
         if exact is not None:
             return exact.edges_collide(start, delta, steps)
         ways = zip(start, delta, steps, strict=True)

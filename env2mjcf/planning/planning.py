@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import positive, whole
+from ..errors import DiagnosticLog, FormatError
 from ..forking import Lock
 from ..simulation.scene import Scene
 from ..simulation.verdicts import Judge
@@ -24,6 +25,8 @@ from .watch import Watch
 # OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
 # depend on which of them is quicker.
 _one_at_a_time = Lock()
+# Extents; finer steps find nothing that the proofs would not, and their number has no end.
+_FINEST = 1e-5
 
 
 def plan(
@@ -61,6 +64,7 @@ def plan(
 
     Raises:
         TypeError: planner is no name, or robot, time, seed or resolution no number of the right kind.
+        FormatError: The file's PositionRes is too small to plan with.
         ValueError: Start or goal is no configuration, or not valid with the other robots as they are in `start` (the
             message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
             resolution is out of range.
@@ -90,7 +94,7 @@ def plan_through(
     """
     rows, name = scene.space.check(q), known(planner)
     _refuse(scene, rows, robot, time, seed)
-    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    step = _step(scene, resolution)
     columns = _columns(scene, robot)
     rows = _others_as_at_start(rows, columns)
     _refuse_invalid(scene, rows)
@@ -145,6 +149,21 @@ def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
     stay = np.repeat(rows[:1], len(rows), axis=0)
     stay[:, columns] = rows[:, columns]
     return stay
+
+
+def _step(scene: Scene, resolution: float | None) -> float:
+    """Return the planner's step in metres."""
+    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    least = _FINEST * scene.extent
+    if step >= least:
+        return step
+    if resolution is not None:
+        raise ValueError(f"resolution is {resolution}; expected at least {least:.3g} m, 1e-5 of the extent")
+    of_file = scene.environment.resolution
+    DiagnosticLog().fail(
+        FormatError, "CFG536", "PositionRes", f"PositionRes {of_file.position:g}: planning takes steps of at least "
+        f"{least:.3g} m, 1e-5 of the extent", hint="correct PositionRes, or give --resolution", span=of_file.span,
+    )  # fmt: skip
 
 
 def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int) -> None:

@@ -40,7 +40,7 @@ class EdgeAnswers(Asking):
             progress: Show a progress bar on a terminal.
 
         Raises:
-            ValueError: q0 and q1 differ in shape, or the resolution is not positive.
+            ValueError: q0 and q1 differ in shape, or the resolution is not positive, or too small for such edges.
         """
         start, delta = self._way(q0, q1)
         extras = (self._queries.steps.resolution(resolution),)
@@ -86,7 +86,7 @@ class EdgeAnswers(Asking):
             resolution: As for `edge_in_collision`.
 
         Raises:
-            ValueError: The path has a wrong shape, or the resolution is not positive.
+            ValueError: The path has a wrong shape, or the resolution is not positive, or too small for such edges.
         """
         queries = self._queries
         return check_path(path, queries.steps, queries.validities, queries.contacts, self.space, resolution)
@@ -103,7 +103,7 @@ class EdgeAnswers(Asking):
         """Return the configurations that `edge_in_collision` looks at on one edge, both ends included, (n, dim).
 
         Raises:
-            ValueError: q0 or q1 is no configuration, or the resolution is not positive.
+            ValueError: q0 or q1 is no configuration, or the resolution is not positive, or too small for such an edge.
         """
         return self._queries.steps.rows(q0, q1, resolution)
 
