@@ -117,11 +117,12 @@ def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], ta
 
 
 def interrupt_randomly(verb: str, folder: Path, count: int, seed: int) -> Tally:
-    """Interrupt a verb at some moments of its life."""
+    """Interrupt a verb at random moments of its life, one in each part of it."""
     chance, tally = random.Random(f"{seed} {verb}"), Tally()
     whole, life = ({}, _SECONDS[verb]) if verb in _SECONDS else uninterrupted(verb, folder)
-    for _ in range(count):
-        interrupt(verb, folder, chance.uniform(0.05, life), whole, tally)
+    for part in range(count):
+        after = max(0.05, chance.uniform(part, part + 1) / count * life)
+        interrupt(verb, folder, after, whole, tally)
     return tally
 
 

@@ -30,7 +30,7 @@ _ENCODING = re.compile(r"^(<\?xml[^>]*?\s)encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')"
 # Bytes that are parsed at once; nesting beyond which lxml refuses all but huge trees.
 _PART, _LXML_NESTING = 1 << 14, 250
 # How the versions of lxml call what is longer than they take.
-_TOO_LONG = re.compile("too (?:big|long)|XML_PARSE_HUGE|huge text node")
+_TOO_LONG = re.compile("too (?:big|long)|XML_PARSE_HUGE|huge text node|Huge input lookup")
 _PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
 _PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
 
