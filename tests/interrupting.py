@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -71,7 +72,7 @@ def uninterrupted(verb: str, folder: Path) -> tuple[dict[str, bytes], float]:
     return _made(folder), time.monotonic() - began
 
 
-def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], tally: Tally) -> None:
+def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], tally: Tally) -> float:
     """Run a verb, interrupt it after some seconds, and look at what it says and leaves.
 
     The signal goes to the process alone, so that what it started is its own to stop.
@@ -82,17 +83,22 @@ def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], ta
         after: The seconds.
         whole: The files that it makes.
         tally: What is added to.
+
+    Returns:
+        The seconds after which it was interrupted, or was done.
     """
-    child = _start(verb, folder)
+    child, began = _start(verb, folder), time.monotonic()
     try:
-        time.sleep(after)
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(after)
+        lived = time.monotonic() - began
         child.send_signal(signal.SIGINT)
         said = child.communicate(timeout=30)[1]
     except subprocess.TimeoutExpired:
         child.kill()
         child.wait()
         tally.wrong.append(f"{verb} after {after:.3f} s: still there after 30 seconds")
-        return
+        return after
     finally:
         left = left_in_session(child.pid)
         for pid in left:
@@ -114,6 +120,7 @@ def interrupt(verb: str, folder: Path, after: float, whole: dict[str, bytes], ta
         tally.wrong.append(f"{what}: left {sorted(name for name in made if made[name] != whole.get(name))}")
     if child.returncode == 0 and made != whole:
         tally.wrong.append(f"{what}: did not write {sorted(whole.keys() - made.keys())}")
+    return lived
 
 
 def interrupt_randomly(verb: str, folder: Path, count: int, seed: int) -> Tally:
@@ -122,7 +129,10 @@ def interrupt_randomly(verb: str, folder: Path, count: int, seed: int) -> Tally:
     whole, life = ({}, _SECONDS[verb]) if verb in _SECONDS else uninterrupted(verb, folder)
     for part in range(count):
         after = max(0.05, chance.uniform(part, part + 1) / count * life)
-        interrupt(verb, folder, after, whole, tally)
+        lived = interrupt(verb, folder, after, whole, tally)
+        if lived < after:
+            # The first run may have compiled what later ones find.
+            life = lived
     return tally
 
 
