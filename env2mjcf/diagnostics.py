@@ -49,7 +49,7 @@ CATALOGUE: dict[str, str] = {
     "ENV149": "A task is for a robot that the problem file does not name.",
     "ENV150": "A problem file names a file outside its folder.",
     "ENV151": "Two robots of a problem file have the same label.",
-    "ENV152": "A link in a folder that is searched leads out of it.",
+    "ENV152": "A link in a folder that is searched leads out of all that was named.",
     # What another dialect cannot express.
     "ENV160": "A dialect has no boundary in its file, or none of this shape; it is lost.",
     "ENV161": "A dialect must have a boundary, and the scene has none; a wide box is written.",

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, FormatError, GeometryError, Severity
+from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, GeometryError, Severity
 from .formats import xml_scene
 from .formats.detect import is_robot_file, is_xml
 from .formats.lexer import Scanner
@@ -47,6 +47,14 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class _Found:
+    """A file to look at, and whether it lies, links resolved, in what was named."""
+
+    path: str
+    inside: bool
+
+
+@dataclass(frozen=True, slots=True)
 class LintResult:
     """What was found in one file and in the files that it names.
 
@@ -75,7 +83,7 @@ def lint(
 
     Args:
         paths: Scenes, robot files, meshes, no pipes; folders are searched for `.env`, `.robot` and `.xml` files. Links
-            in them that lead out of them are not followed, unless `allow_outside`.
+            in them that lead out of all of these, and of `mesh_dirs`, are not followed, unless `allow_outside`.
         options: How to read and load; `strict` is ignored, so that a warning does not end a file.
         progress: Show a progress bar on a terminal.
 
@@ -90,10 +98,10 @@ def lint(
     results: list[LintResult] = []
     seen: set[Diagnostic] = set()
     bar = tqdm(files, unit="file", delay=1, leave=False, disable=not (progress and sys.stderr.isatty()))
-    for path, leads_out in bar:
-        kind = Kind.OTHER if leads_out else _kind(path)
+    for file in bar:
+        path, kind = file.path, _kind(file.path) if file.inside else Kind.OTHER
         try:
-            found = dict.fromkeys(_leads_out(path) if leads_out else _lint_file(path, kind, chosen))
+            found = dict.fromkeys(_lint_file(path, kind, chosen) if file.inside else [_leads_out(path)])
         except Exception as error:
             error.add_note(f"while linting {path}")
             raise
@@ -104,37 +112,33 @@ def lint(
     return tuple(results)
 
 
-def _files(paths: Iterable[PathArgument], options: Options) -> list[tuple[str, bool]]:
-    """Return the files to look at, each once, and whether each is a link that is not to be followed."""
-    files: dict[str, tuple[str, bool]] = {}
-    for path in paths:
-        for file in sorted(_search(path, options)) if os.path.isdir(path) else [(os.fspath(path), False)]:
-            files.setdefault(os.path.realpath(file[0]), file)
+def _files(paths: Iterable[PathArgument], options: Options) -> list[_Found]:
+    """Return the files to look at, each once."""
+    named = [os.fspath(path) for path in paths]
+    roots = [Path(os.path.realpath(path)) for path in (*named, *options.mesh_dirs)]
+    files: dict[str, _Found] = {}
+    for path in named:
+        for file in sorted(_search(path)) if os.path.isdir(path) else [path]:
+            real = os.path.realpath(file)
+            inside = options.allow_outside or any(Path(real).is_relative_to(root) for root in roots)
+            if not os.path.isdir(path) or not inside or _kind(file) is not Kind.OTHER:
+                files.setdefault(real, _Found(file, inside))
     return list(files.values())
 
 
-def _search(folder: PathArgument, options: Options) -> Iterator[tuple[str, bool]]:
-    inside = Path(os.path.realpath(folder))
+def _search(folder: str) -> Iterator[str]:
     for where, folders, names in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]
         for name in names:
-            path = os.path.normpath(os.path.join(where, name))
-            extension = os.path.splitext(name)[1].lower()
-            if extension not in (".env", ".robot", ".xml"):
-                continue
-            leads_out = not options.allow_outside and not Path(os.path.realpath(path)).is_relative_to(inside)
-            if leads_out or extension != ".xml" or _kind(path) is not Kind.OTHER:
-                yield path, leads_out
+            if os.path.splitext(name)[1].lower() in (".env", ".robot", ".xml"):
+                yield os.path.normpath(os.path.join(where, name))
 
 
-def _leads_out(path: str) -> Sequence[Diagnostic]:
-    try:
-        DiagnosticLog().fail(
-            FormatError, "ENV152", path, f"{path} is a link that leads out of the folder, and is not read",
-            hint="name the file itself, or allow it with allow_outside=True (--allow-outside)",
-        )  # fmt: skip
-    except FormatError as error:
-        return error.diagnostics
+def _leads_out(path: str) -> Diagnostic:
+    return Diagnostic(
+        "ENV152", Severity.ERROR, path, f"{path} is a link that leads out of what is searched, and is not read",
+        "name its folder, too, or allow it with allow_outside=True (--allow-outside)",
+    )  # fmt: skip
 
 
 def _kind(path: str) -> Kind:

@@ -6,7 +6,7 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,9 +84,18 @@ def write_together(contents: Mapping[Path, bytes], code: str) -> None:
             with suppress(OSError):
                 replacement.take_back()
         raise
-    for replacement in replacements.values():
+    copies = [replacement.old for replacement in replacements.values()]
+    try:
+        _remove(copies)
+    except BaseException:
+        _remove(copies)  # an interrupt waits for it
+        raise
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
         with suppress(OSError):
-            replacement.old.unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
 
 
 @dataclass(slots=True)

@@ -85,6 +85,20 @@ class TestWhatIsLookedAt:
 
     @pytest.mark.parametrize("name", ["a.env", "a.robot", "a.xml"])
     def test_a_link_that_leads_out_of_a_folder_is_not_followed(self, name, folder):
+        (folder / "shared").mkdir()
+        (folder / "shared" / "common.env").write_text(scene("../cube.g", "../cube.g"))
+        (folder / "linked").mkdir()
+        (folder / "linked" / "common.env").symlink_to("../shared/common.env")
+        for paths, options in (
+            (["linked", "shared"], {}),
+            (["shared", "linked"], {}),
+            (["linked"], {"mesh_dirs": "shared"}),
+        ):
+            assert [(r.kind, "ENV152" in codes(r)) for r in lint(paths, Options.from_keywords(options))] == [
+                ("scene", False)
+            ]
+        assert [codes(r) for r in lint(["linked"])] == [["ENV152"]]
+
         (folder / "secret").write_text("the first word of this file would be quoted")
         (folder / "scenes").mkdir()
         (folder / "scenes" / "inside.env").write_text(scene("../cube.g", "../cube.g"))

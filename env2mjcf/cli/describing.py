@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..dialects import RULES
+from ..errors import DiagnosticLog, FormatError
 from ..kinematics import RobotKinematics
 from ..model import Boundary, Dialect, Environment, Resolution
 from ..names import body_names, dof_names
-from ..opening import open_regular
+from ..opening import NoRegularFileError, open_regular
 from ..scaling import scaled
 from ..space import ConfigurationSpace
 from .readings import Readings, compare_readings
@@ -163,5 +164,12 @@ def _environment_file(environment: Environment) -> str:
 
 
 def _begins_as_xml(path: Path) -> bool:
-    with open_regular(path) as file:
+    try:
+        file = open_regular(path)
+    except NoRegularFileError as error:
+        DiagnosticLog().fail(
+            FormatError, "ENV104", str(path), f"{path} cannot be described: {error.strerror}",
+            hint="save it as a file, which is read twice",
+        )  # fmt: skip
+    with file:
         return file.read(1024).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")

@@ -52,8 +52,8 @@ examples:
   env2mjcf convert --help                         all options of a verb
 
 exit status: 0 done, free or valid; 1 a finding (collision, invalid configuration, lint error); 2 wrong usage;
-3 bad input, or results that cannot be written; 4 a fault of env2mjcf, or too little memory; 128 and the number of a
-signal that ended it. Results go to stdout, everything else to stderr.
+3 bad input, or results that cannot be written; 4 a fault of env2mjcf, or too little memory or too many
+open files; 128 and the number of a signal that ended it. Results go to stdout, everything else to stderr.
 """
 
 

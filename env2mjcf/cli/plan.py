@@ -14,12 +14,12 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..errors import DiagnosticLog, FormatError
+from ..formats.path import begins_as_path
 from ..options import Options, PathArgument
 from ..statuses import DONE, FINDING
-from ..writing import refuse_unwritable
+from ..writing import refuse_foreign, refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .configurations import refuse_without_freedom
-from .outputs import refuse_foreign_path
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
@@ -88,7 +88,9 @@ class Plan:
             query = () if self.options.query is None else (self.options.query,)
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
             for file in (Path(self.out), _approach(Path(self.out))):
-                refuse_foreign_path(file)
+                refuse_foreign(
+                    file, "CFG553", "path file", lambda data: begins_as_path(data.decode("utf-8", "replace"))
+                )
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
         log = DiagnosticLog(self.options.strict)

@@ -11,7 +11,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..errors import DiagnosticLog
-from ..options import DialectName, Limits, PathArgument, Semantics
+from ..options import LARGEST, DialectName, Limits, PathArgument, Semantics
 from ..statuses import DONE
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_diagnostics, print_json, print_parts
@@ -96,6 +96,8 @@ class Translate:
         lower, upper = self.box[::2], self.box[1::2]
         if not all(a < b for a, b in zip(lower, upper, strict=True)):
             raise ValueError("--box is empty; expected the lower and the upper end of x, y and z")
+        if max(map(abs, self.box)) > LARGEST:
+            raise ValueError(f"--box is larger than {LARGEST:g}, and nothing that is could be read")
         return Boundary(BoundaryShape.BOX, lower, upper)
 
     def _options(self) -> dict[str, Any]:

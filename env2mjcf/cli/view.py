@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 import webbrowser
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 from tyro.conf import Positional
 
+from .. import starting
 from ..errors import DiagnosticLog
 from ..options import Options, PathArgument
 from ..statuses import DONE
@@ -102,7 +104,7 @@ class View:
                     viewer.close()
         except KeyboardInterrupt:
             pass
-        return DONE
+        return DONE if starting.interrupted in (0, signal.SIGINT) else starting.interrupted_status()
 
     def _announce(self, port: int, log: DiagnosticLog) -> None:
         url = f"http://127.0.0.1:{port}"

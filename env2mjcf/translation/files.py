@@ -15,7 +15,7 @@ from ..model import Environment, MultiBody
 from ..options import Options, PathArgument
 from ..writing import refuse_unwritable, write_together
 from .meshes import named_from
-from .outputs import Kind, Output, refuse_foreign
+from .outputs import Kind, Output, refuse_no_translation
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def write_environment(
         rows = query_text(environment.tasks, index=begins_with_robot(environment))
         companions.append(Output(query, Kind.QUERY, rows))
     scene = Output(out, Kind.ENVIRONMENT, env_text(placed))
-    refuse_foreign(scene, companions)
+    refuse_no_translation(scene, companions)
     write_together({o.path: o.text.encode("utf-8", "surrogateescape") for o in (*companions, scene)}, "ENV179")
     return Written(out, tuple(names), query, outside, tuple(log))
 

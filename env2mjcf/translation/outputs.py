@@ -41,7 +41,7 @@ _READERS: dict[Kind, Callable[[Source, DiagnosticLog], object]] = {
 }
 
 
-def refuse_foreign(environment: Output, companions: Sequence[Output]) -> None:
+def refuse_no_translation(environment: Output, companions: Sequence[Output]) -> None:
     """Refuse to replace what is no older translation.
 
     The env file has been named, and may be replaced if it begins as one. Its companions have not: they must read as
