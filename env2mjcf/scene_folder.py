@@ -156,11 +156,14 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
     """Remove a staged scene, and before it those of its assets (or of the given ones) that no other scene names.
 
     Raises:
-        OSError: Another scene cannot be read, and may name any of them.
+        OSError: The folder, or another scene, cannot be read, and may name any of them.
     """
     left = _named(staged) if names is None else set(names)
     if left:
-        for scene in folder.glob("*.xml"):
+        # Not by `Path.glob`, which takes a folder that cannot be listed for an empty one.
+        with os.scandir(folder) as listing:
+            scenes = [Path(item.path) for item in listing if item.name.endswith(".xml")]
+        for scene in scenes:
             if scene != staged:
                 left -= _named(scene)
     for name in left:

@@ -157,6 +157,19 @@ class TestThreads:
             for number, found in zip(range(2, 18), pool.map(work, range(2, 18)), strict=True):
                 assert found == alone[number % 2]
 
+    def test_where_no_more_can_be_had_those_that_are_there_do_all(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        scene = env2mjcf.load(ALPHA, engine="mujoco")
+        q = rows(scene, 500)
+        expected, start = scene.in_collision(q, threads=1), threading.Thread.start
+
+        def refused(thread: threading.Thread) -> None:
+            if thread.name == "env2mjcf-2":
+                raise RuntimeError("can't start new thread")
+            start(thread)
+
+        monkeypatch.setattr(threading.Thread, "start", refused)
+        assert (scene.in_collision(q, threads=4) == expected).all()
+
     def test_that_plan_get_the_ways_of_their_seeds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         skip_without("planning")
         from env2mjcf.planning import bridge

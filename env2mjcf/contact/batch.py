@@ -140,7 +140,10 @@ def _in_threads(queries: ContactQueries, question: Question, store: Store, count
     try:
         for number in range(1, count):
             other = threading.Thread(target=help_out, name=f"env2mjcf-{number}")
-            other.start()
+            try:
+                other.start()
+            except RuntimeError:
+                break  # the system has no more of them, or the interpreter ends: those that are there do all
             started.append(other)
         work()
     finally:
