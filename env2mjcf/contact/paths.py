@@ -60,7 +60,7 @@ class EdgeSteps:
         return np.maximum(2, steps.astype(np.int64) + 1)
 
     def bounded_counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
-        """Return the same, of edges that can be checked.
+        """Return `counts` of edges that can be checked.
 
         Raises:
             ValueError: An edge has more than ten million configurations.

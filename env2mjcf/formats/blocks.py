@@ -82,17 +82,12 @@ def read_coordinate(scan: Scanner, what: str) -> float:
     """Read a number that is small enough to be computed with."""
     start = scan.position
     value = scan.number(what)
-    check_coordinate(scan, value, what, scan.span(start))
-    return value
-
-
-def check_coordinate(scan: Scanner, value: float, what: str, span: Span) -> None:
-    """Refuse a number that is too large to be computed with."""
     if abs(value) > LARGEST:
         scan.fail(
             "ENV183", f"{what} is {value:g}; at most {LARGEST:g} can be computed with",
-            hint="is the file damaged? What has no end is wide enough with 1e6", span=span,
+            hint="is the file damaged? What has no end is wide enough with 1e6", span=scan.span(start),
         )  # fmt: skip
+    return value
 
 
 def read_range(scan: Scanner, what: str) -> tuple[float, float]:
