@@ -153,8 +153,9 @@ def _made(folder: Path) -> dict[str, bytes]:
 
 
 def heed() -> None:
-    # Jobs in the background inherit that it is ignored.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Jobs in the background inherit that they are ignored, and so does what nohup starts.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def left_in_session(session: int) -> list[int]:
