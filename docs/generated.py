@@ -15,7 +15,8 @@ from types import NoneType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from env2mjcf.cli.main import VERBS
-from env2mjcf.options import Limits, Options
+from env2mjcf.limits import Limits
+from env2mjcf.options import Options
 
 ROOT = Path(__file__).resolve().parent.parent
 WIDTH = 90

@@ -2,20 +2,21 @@
 
 import sys
 
-from . import starting
+from .cli import program
 
 
 def run() -> int:
     """Run the program, and return its exit status."""
+    program.begin()
     try:
         from .cli.main import main
 
         return main()
     except KeyboardInterrupt:
-        return starting.interrupted_status()
+        return program.interrupted_status()
     finally:
         # All is done; what the interpreter tidies up is no place for a traceback.
-        starting.end_at_once()
+        program.end_at_once()
 
 
 if __name__ == "__main__":

@@ -10,15 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import ConversionError, Diagnostic, DiagnosticLog
-from .locking import FolderBusyError
-from .model import Environment
+from .diagnostics import DiagnosticLog
+from .errors import ConversionError, Diagnostic
+from .mjcf.folder import Staged
+from .model.environment import Environment
 from .options import Options, PathArgument
 from .report import Report
-from .scene_folder import Staged
-from .simulation.loading import load_file
-from .simulation.preparing import prepare
+from .simulation.loading import prepare
+from .simulation.mujoco_model import load_file
 from .simulation.scene import Scene
+from .system.locks import FolderBusyError
 
 
 @dataclass(frozen=True, slots=True)

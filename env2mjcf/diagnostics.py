@@ -6,6 +6,11 @@ MuJoCo, `CFG` configurations and queries.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import NoReturn
+
+from .errors import Diagnostic, Env2MjcfError, Severity, Span
+
 CATALOGUE: dict[str, str] = {
     # Text files that cannot be read: 10x the file, 11x numbers and words, 12x keywords, 13x the kind, 14x XML.
     "ENV101": "A file that is named does not exist.",
@@ -239,3 +244,57 @@ CATALOGUE: dict[str, str] = {
     "CFG552": "A picture or film cannot be written.",
     "CFG553": "A file that is no path stands where a path would be written; it is kept.",
 }
+
+
+class DiagnosticLog:
+    """Collects diagnostics; in strict mode the first warning is raised as an error.
+
+    Args:
+        strict: Whether warnings are errors.
+    """
+
+    def __init__(self, strict: bool = False) -> None:
+        self.strict = strict
+        self._items: list[Diagnostic] = []
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
+        """Add findings that an earlier stage has already judged."""
+        self._items.extend(diagnostics)
+
+    def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
+        """Record something worth knowing that is no fault."""
+        self._items.append(Diagnostic(code, Severity.INFO, subject, message, hint, span))
+
+    def warn(
+        self,
+        kind: type[Env2MjcfError],
+        code: str,
+        subject: str,
+        message: str,
+        *,
+        hint: str = "",
+        span: Span | None = None,
+    ) -> None:
+        """Record something doubtful; raise it as `kind` in strict mode."""
+        if self.strict:
+            self.fail(kind, code, subject, message, hint=hint, span=span)
+        self._items.append(Diagnostic(code, Severity.WARNING, subject, message, hint, span))
+
+    def fail(
+        self,
+        kind: type[Env2MjcfError],
+        code: str,
+        subject: str,
+        message: str,
+        *,
+        hint: str = "",
+        span: Span | None = None,
+    ) -> NoReturn:
+        """Raise a fault as `kind`, with everything recorded before it."""
+        raise kind(Diagnostic(code, Severity.ERROR, subject, message, hint, span), tuple(self._items))

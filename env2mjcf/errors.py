@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NoReturn
 
 
 class Severity(StrEnum):
@@ -120,60 +119,6 @@ class KinematicsError(Env2MjcfError):
 
 class ConversionError(Env2MjcfError):
     """A scene that cannot be expressed in, or is refused by, MuJoCo; or output that cannot be written."""
-
-
-class DiagnosticLog:
-    """Collects diagnostics; in strict mode the first warning is raised as an error.
-
-    Args:
-        strict: Whether warnings are errors.
-    """
-
-    def __init__(self, strict: bool = False) -> None:
-        self.strict = strict
-        self._items: list[Diagnostic] = []
-
-    def __iter__(self) -> Iterator[Diagnostic]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
-        """Add findings that an earlier stage has already judged."""
-        self._items.extend(diagnostics)
-
-    def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
-        """Record something worth knowing that is no fault."""
-        self._items.append(Diagnostic(code, Severity.INFO, subject, message, hint, span))
-
-    def warn(
-        self,
-        kind: type[Env2MjcfError],
-        code: str,
-        subject: str,
-        message: str,
-        *,
-        hint: str = "",
-        span: Span | None = None,
-    ) -> None:
-        """Record something doubtful; raise it as `kind` in strict mode."""
-        if self.strict:
-            self.fail(kind, code, subject, message, hint=hint, span=span)
-        self._items.append(Diagnostic(code, Severity.WARNING, subject, message, hint, span))
-
-    def fail(
-        self,
-        kind: type[Env2MjcfError],
-        code: str,
-        subject: str,
-        message: str,
-        *,
-        hint: str = "",
-        span: Span | None = None,
-    ) -> NoReturn:
-        """Raise a fault as `kind`, with everything recorded before it."""
-        raise kind(Diagnostic(code, Severity.ERROR, subject, message, hint, span), tuple(self._items))
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -13,23 +13,23 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from .errors import Diagnostic, DiagnosticLog, Env2MjcfError, GeometryError, Severity
+from .diagnostics import DiagnosticLog
+from .errors import Diagnostic, Env2MjcfError, GeometryError, Severity
 from .formats import xml_scene
 from .formats.detect import is_robot_file, is_xml
+from .formats.env import read_robot
 from .formats.lexer import Scanner
 from .formats.reading import read_scene
-from .formats.robot import read_robot
 from .formats.source import read_source
-from .formats.xml_parsing import parse_xml
-from .geometry.bounded import bounded
-from .geometry.loading import READABLE, load_mesh
+from .formats.xml import parse_xml
+from .geometry.mesh import READABLE, load_mesh
 from .geometry.repair import repair_diagnostics, repaired
 from .geometry.resolve import resolve_all
-from .kinematics import RobotKinematics
-from .model import Body, Environment, MultiBody, MultiBodyKind
-from .opening import open_regular
+from .kinematics.forward import RobotKinematics
+from .limits import Work, bounded
+from .model.environment import Body, Environment, MultiBody, MultiBodyKind
 from .options import Options, PathArgument
-from .work import Work
+from .system.files import open_regular
 
 # What is skipped is never tried in another way: comments could end at each of the marks behind their own.
 _ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
@@ -182,7 +182,7 @@ def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
 
 def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
     # Imported here because MuJoCo is slow to import, and robots and meshes do not need it.
-    from .simulation.preparing import prepare
+    from .simulation.loading import prepare
 
     try:
         if is_robot_file(read_source(path, DiagnosticLog(), options.limits, regular=True)):

@@ -1,8 +1,12 @@
-"""The options of reading, compiling and loading, in one place."""
+"""Arguments that are numbers: those that are none, or out of range, are refused by name.
+
+MERGED: The options of reading, compiling and loading, in one place.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
@@ -10,6 +14,43 @@ from os import PathLike
 from typing import Any, Literal, get_args
 
 from .errors import did_you_mean
+from .limits import Limits
+
+
+def whole(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Return an argument that is a whole number.
+
+    Raises:
+        TypeError: It is none (True and 2.0 are not); the message names it.
+        ValueError: It is below `least` or above `most`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} is {value!r}; expected a whole number")
+    number = int(value)
+    if number < least or (most is not None and number > most):
+        raise ValueError(f"{name} is {number}; expected {_range(str(least), most)}")
+    return number
+
+
+def positive(name: str, value: object, most: float | None = None) -> float:
+    """Return an argument that is a finite number above zero.
+
+    Raises:
+        TypeError: It is no number; the message names it.
+        ValueError: It is not positive, not finite, or above `most`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name} is {value!r}; expected a number")
+    number = float(value)
+    if not 0 < number < math.inf or (most is not None and number > most):
+        limit = "" if most is None else f" up to {most:g}"
+        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
+    return number
+
+
+def _range(least: str, most: int | None) -> str:
+    return f"at least {least}" if most is None else f"{least} to {most}"
+
 
 Semantics = Literal["planner", "page"]
 Collision = Literal["auto", "hull", "surface", "solid", "coacd"]
@@ -18,55 +59,6 @@ Actuators = Literal["position"]
 Engine = Literal["auto", "exact", "mujoco"]
 DialectName = Literal["A", "B", "C", "D", "E"]
 PathArgument = str | PathLike[str]
-
-LARGEST = 1e30
-"""Largest coordinate, in file units or metres, that is computed with: volumes and inertias of what is larger overflow,
-MuJoCo's own numbers end at 3e38, and planners do not end in a wider space."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Bounds on hostile input. A file that passes one is refused with a diagnostic that names it.
-
-    Attributes:
-        file_bytes: Size of any one input file.
-        bodies: Bodies in a scene.
-        connections: Connections in a scene.
-        mesh_elements: Vertices, and polygon corners, of one mesh.
-        name_length: Characters in a file name or label.
-        polygon_corners: Corners of one polygon of a mesh.
-        polygon_work: Points looked at while polygons of one mesh are cut into triangles: a polygon that is not
-            convex takes up to the square of its corners, or more.
-        scene_elements: Triangles of all bodies of a scene, those of a mesh that several bodies have counted each time.
-        scene_cells: Convex collision pieces of all bodies of a scene, counted in the same way: about 25 kB of memory
-            each while MuJoCo compiles it, more where they have many corners.
-        mesh_work: Comparisons of parts of one mesh while it is repaired and cut into convex pieces: about half a
-            microsecond each.
-        pairs: Pairs of bodies of a scene that may touch.
-        rows: Configurations of one query, path or text of rows; nodes of one roadmap.
-        nesting: Elements of an XML file within each other; those that are read need seven.
-        elements: Elements of an XML file.
-    """
-
-    file_bytes: int = 512 * 1024 * 1024
-    bodies: int = 100_000
-    connections: int = 100_000
-    mesh_elements: int = 50_000_000
-    name_length: int = 4096
-    polygon_corners: int = 10_000
-    polygon_work: int = 20_000_000
-    scene_elements: int = 500_000_000
-    scene_cells: int = 200_000
-    mesh_work: int = 500_000_000
-    pairs: int = 2_000_000
-    rows: int = 5_000_000
-    nesting: int = 100
-    elements: int = 1_000_000
-
-    @staticmethod
-    def hint(name: str) -> str:
-        """Return what to do where an input that is trusted passes a limit."""
-        return f"raise limits=Limits({name}=...), on the command line --limits.{name.replace('_', '-')}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
 
-from .dialects import RULES
 from .errors import did_you_mean
-from .kinematics import RobotKinematics
-from .model import BaseKind, JointType, MultiBody, PlannerRules
+from .kinematics.forward import RobotKinematics
+from .model.dialects import RULES
+from .model.environment import BaseKind, JointType, MultiBody, PlannerRules
 from .options import Options
 
 ContactKind = Literal["obstacle", "self", "robot"]

@@ -8,18 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import Diagnostic, DiagnosticLog, GeometryError
+from .diagnostics import DiagnosticLog
+from .errors import Diagnostic, GeometryError
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
+from .kinematics.space import ConfigurationSpace
+from .kinematics.transforms import Array
+from .limits import Limits
+from .mjcf.checks import refuse_long_chains
 from .mjcf.compiler import Document, compile_mjcf
-from .mjcf.nesting import refuse_long_chains
-from .model import Environment
-from .names import dof_names
-from .options import Limits, Options, PathArgument
+from .model.environment import Environment
+from .model.names import dof_names
+from .model.scaling import scaled
+from .options import Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
-from .scaling import scaled
-from .space import ConfigurationSpace
-from .transforms import Array
 
 
 @dataclass(frozen=True, slots=True)

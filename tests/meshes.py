@@ -9,10 +9,10 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from env2mjcf.errors import DiagnosticLog, GeometryError
-from env2mjcf.geometry.loading import load_mesh
-from env2mjcf.geometry.mesh import Mesh
-from env2mjcf.options import Limits
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import GeometryError
+from env2mjcf.geometry.mesh import Mesh, load_mesh
+from env2mjcf.limits import Limits
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import trimesh
 from hypothesis import strategies as st
 from meshes import voxels
 
-from env2mjcf.dialects import RULES, VOCABULARIES
-from env2mjcf.model import (
+from env2mjcf.model.dialects import RULES, VOCABULARIES
+from env2mjcf.model.environment import (
     BaseKind,
     Body,
     Boundary,

@@ -9,8 +9,8 @@ import pytest
 import trimesh
 from meshes import box, channel, corpus_meshes, grid, joined, moved, rotation, soup, tetrahedron, turned
 
-from env2mjcf.diagnostics import CATALOGUE
-from env2mjcf.errors import DiagnosticLog, GeometryError, Severity
+from env2mjcf.diagnostics import CATALOGUE, DiagnosticLog
+from env2mjcf.errors import GeometryError, Severity
 from env2mjcf.geometry.analysis import analyse, mesh_diagnostics
 from env2mjcf.geometry.convexity import is_convex
 from env2mjcf.geometry.mesh import Mesh

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from texts import ENV_TEXTS, PROBLEM, ROBOT, XML_ENVIRONMENT, XML_ROBOT, E, warnings, write
 
 import env2mjcf
-from env2mjcf.errors import Diagnostic, DiagnosticLog, Env2MjcfError
-from env2mjcf.formats.query import read_query
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Diagnostic, Env2MjcfError
+from env2mjcf.formats.rows import read_query
 from env2mjcf.formats.source import Source
-from env2mjcf.model import Environment
+from env2mjcf.model.environment import Environment
 
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("*/*.env"))
 TOKEN = re.compile(r"\S+\s*")

@@ -16,7 +16,7 @@ from scenes import free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.batch import run
-from env2mjcf.batch import running as running_module
+from env2mjcf.batch import runner as running_module
 from env2mjcf.cli.main import main
 
 ROOT = Path(__file__).parents[1]

@@ -15,10 +15,10 @@ from batches import CUBES, JOURNAL, PARTIAL, Stop, left, saved, stopped
 from scenes import write_scene
 
 import env2mjcf
-from env2mjcf import locking
 from env2mjcf.batch import run
-from env2mjcf.batch import running as running_module
+from env2mjcf.batch import runner as running_module
 from env2mjcf.cli.main import main
+from env2mjcf.system import locks as locking
 
 OURS = '{"format": "env2mjcf batch 1", "job": "0", "rows": 100, "done": 0, "digest": "0"}'
 

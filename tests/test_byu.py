@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from env2mjcf.errors import DiagnosticLog, GeometryError, Severity
-from env2mjcf.formats.byu import export_byu, load_byu, read_byu, register
-from env2mjcf.formats.gms import read_gms
-from env2mjcf.formats.mesh_text import MeshArrays
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import GeometryError, Severity
+from env2mjcf.formats.meshes.byu import export_byu, load_byu, read_byu, read_gms, teach
+from env2mjcf.formats.meshes.text import MeshArrays
 from env2mjcf.geometry.mesh import Mesh
-from env2mjcf.options import Limits
+from env2mjcf.limits import Limits
 
 TETRAHEDRON = """1 4 4 12
 1 4
@@ -264,7 +264,8 @@ def test_no_input_ends_in_anything_but_a_mesh_or_a_geometry_error(data: bytes | 
 
 def test_trimesh_loads_and_exports_g_once_registered(tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
-    register()
+    teach(trimesh.exchange.load)
+    teach(trimesh.exchange.export)
     box = trimesh.creation.box((1, 2, 3))
     box.export(tmp_path / "box.g")
     loaded = trimesh.load_mesh(tmp_path / "box.g")

@@ -17,11 +17,11 @@ from scenes import MODELS
 
 import env2mjcf
 from env2mjcf.cli.main import main
-from env2mjcf.errors import DiagnosticLog
+from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry import shapes
 from env2mjcf.geometry.analysis import analyse
-from env2mjcf.geometry.cache import GeometryCache, default_folder, entry_key
 from env2mjcf.geometry.packing import pack, unpack
+from env2mjcf.geometry.store import GeometryCache, default_folder, entry_key
 
 BUG_TRAP = MODELS / "bug-trap" / "bug-trap.env"
 

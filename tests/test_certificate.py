@@ -13,13 +13,12 @@ from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.cli.main import main
-from env2mjcf.errors import DiagnosticLog
+from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry.analysis import analyse
 from env2mjcf.geometry.certificate import Certificate, certify
 from env2mjcf.geometry.distance import distances, spread
-from env2mjcf.geometry.hull import hull_faces
 from env2mjcf.geometry.mesh import Mesh
-from env2mjcf.geometry.pieces import hull_piece
+from env2mjcf.geometry.pieces import hull_faces, hull_piece
 from env2mjcf.geometry.shapes import CollisionShape, collision_shape
 
 THICKNESS = 1e-5

@@ -13,8 +13,8 @@ from scenes import MODELS, box_mesh, free_cube, write_scene
 from test_scene import notched_block
 
 import env2mjcf
-from env2mjcf.contact.advancement import certified
-from env2mjcf.formats.byu import export_byu
+from env2mjcf.contact.edges import certified
+from env2mjcf.formats.meshes.byu import export_byu
 
 FLYER = "1\nsmall.g Volumetric Rotational\nConnections\n0\n"
 

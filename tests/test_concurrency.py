@@ -172,7 +172,7 @@ class TestThreads:
 
     def test_that_plan_get_the_ways_of_their_seeds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         skip_without("planning")
-        from env2mjcf.planning import bridge
+        from env2mjcf.planning import ompl_bridge as bridge
 
         scene = env2mjcf.load(ALPHA)
         q = scene.space.sample(60, seed=0)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from meshes import box, channel, corpus_meshes, grid, joined, moved, rotation, turned
 
 from env2mjcf.geometry.analysis import analyse
+from env2mjcf.geometry.coplanar import Polygon, convex_polygons
 from env2mjcf.geometry.mesh import Mesh
-from env2mjcf.geometry.polygons import Polygon, convex_polygons
 
 
 def merged(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, tuple[Polygon, ...]]:

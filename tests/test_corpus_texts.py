@@ -10,7 +10,7 @@ from real_scenes import RealScene, real_scenes
 
 import env2mjcf
 from env2mjcf.errors import Severity
-from env2mjcf.kinematics import RobotKinematics
+from env2mjcf.kinematics.forward import RobotKinematics
 
 TEXTS = sorted((CORPUS / "texts").glob("*.env")) if CORPUS else []
 # Files that are known to be doubtful, and why.

@@ -16,9 +16,9 @@ import folders
 import numpy as np
 import pytest
 
-from env2mjcf.errors import DiagnosticLog
-from env2mjcf.geometry.cache import GeometryCache, entry_key
+from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry.packing import pack
+from env2mjcf.geometry.store import GeometryCache, entry_key
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pipes, limits, permissions")
 VALUE = (1.5, "word", (np.arange(12.0), np.arange(3)))

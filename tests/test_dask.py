@@ -114,7 +114,7 @@ def test_ctrl_c_takes_tasks_back(client: Any, scene: env2mjcf.Scene, monkeypatch
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("env2mjcf.contact.chunks.Chunks.took", interrupted)
+        patch.setattr("env2mjcf.contact.tasks.Chunks.took", interrupted)
         with pytest.raises(KeyboardInterrupt):
             scene.clearance(near(scene, 20_000), executor=executor)
     deadline = time.monotonic() + 20

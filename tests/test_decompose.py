@@ -13,12 +13,13 @@ from scenes import MODELS
 
 import env2mjcf
 from env2mjcf.cli.main import main
-from env2mjcf.errors import DiagnosticLog, GeometryError
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import GeometryError
 from env2mjcf.geometry import decompose
 from env2mjcf.geometry.analysis import analyse
-from env2mjcf.geometry.cache import GeometryCache
 from env2mjcf.geometry.decompose import approximate_parts
 from env2mjcf.geometry.shapes import collision_shape
+from env2mjcf.geometry.store import GeometryCache
 
 ALPHA = MODELS / "alpha" / "alpha.env"
 needs_coacd = needs("decompose")

@@ -7,10 +7,11 @@ import time
 import pytest
 from texts import ENV_TEXTS, PROBLEM, ROBOT, XML_ENVIRONMENT, B, C, D, E, Reader, fault, place
 
-from env2mjcf.errors import DiagnosticLog, FormatError
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import FormatError
 from env2mjcf.formats.detect import detect, is_robot_file, is_xml
 from env2mjcf.formats.source import Source
-from env2mjcf.model import Dialect
+from env2mjcf.model.environment import Dialect
 
 
 def dialect_of(text: str) -> Dialect:

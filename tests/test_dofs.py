@@ -7,9 +7,10 @@ from math import inf, pi
 
 import pytest
 
-from env2mjcf.dofs import DofKind, build_tree, degrees_of_freedom
-from env2mjcf.errors import DiagnosticLog, KinematicsError
-from env2mjcf.model import (
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import KinematicsError
+from env2mjcf.kinematics.tree import DofKind, build_tree, degrees_of_freedom
+from env2mjcf.model.environment import (
     BaseKind,
     Body,
     Connection,

@@ -16,7 +16,7 @@ from truth import Truth, bisected, near_obstacles
 
 import env2mjcf
 import env2mjcf.contact.exact.engine as exact_engine
-from env2mjcf.formats.byu import export_byu
+from env2mjcf.formats.meshes.byu import export_byu
 
 needs_numba = needs("fast")
 

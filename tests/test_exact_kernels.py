@@ -12,16 +12,16 @@ from scenes import MODELS
 import env2mjcf
 from env2mjcf.contact.exact.motions import Motions
 from env2mjcf.contact.exact.wide_tree import BLOCK, LANES, box_tree, depth, wide_tree
+from env2mjcf.geometry.distance import nearest
 from env2mjcf.geometry.orientation import winding_numbers
-from env2mjcf.geometry.triangle_distance import nearest
-from env2mjcf.transforms import rotation_matrix, transform
+from env2mjcf.kinematics.transforms import rotation_matrix, transform
 
 pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
 
 from env2mjcf.contact.exact.kernels.boxes import boxes_apart, lanes_near
-from env2mjcf.contact.exact.kernels.insides import _LEAN_X, _LEAN_Y, holds
-from env2mjcf.contact.exact.kernels.opening import opened
+from env2mjcf.contact.exact.kernels.compiling import opened
 from env2mjcf.contact.exact.kernels.separations import triangle_distance, triangle_gap
+from env2mjcf.contact.exact.kernels.touching import _LEAN_X, _LEAN_Y, holds
 from env2mjcf.contact.exact.kernels.triangles import box_meets, triangle_meets
 
 
@@ -172,7 +172,7 @@ def test_trees_over_equal_boxes_are_not_deep() -> None:
 
 
 def test_steps_place_links_where_the_kinematics_do() -> None:
-    from env2mjcf.contact.exact.kernels.frames import place
+    from env2mjcf.contact.exact.kernels.poses import place
 
     checked = 0
     for path in sorted(MODELS.glob("*/*.env")):

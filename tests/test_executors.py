@@ -21,8 +21,8 @@ from extras import skip_without
 from scenes import free_cube, write_scene
 
 import env2mjcf
-from env2mjcf.contact import remote
-from env2mjcf.contact.chunks import Chunks
+from env2mjcf.contact import executors as remote
+from env2mjcf.contact.tasks import Chunks
 
 ROOT = Path(__file__).parents[1]
 

@@ -242,7 +242,7 @@ class TestRaces:
 
         handle = os.open(out, os.O_RDONLY)
         fcntl.flock(handle, fcntl.LOCK_EX)
-        monkeypatch.setattr(env2mjcf.locking, "PATIENCE", 0.2)
+        monkeypatch.setattr(env2mjcf.system.locks, "PATIENCE", 0.2)
         with pytest.raises(env2mjcf.ConversionError, match="locked") as caught:
             env2mjcf.convert(scenes[0], out)
         os.close(handle)

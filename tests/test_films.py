@@ -19,7 +19,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.companions import read_path, write_path
 from env2mjcf.view import film, offscreen
-from env2mjcf.view.encoding import encoder
+from env2mjcf.view.films import encoder
 from env2mjcf.view.trails import paced, reference_points
 
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")

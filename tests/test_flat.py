@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from env2mjcf.geometry.shells.flat import FlatPolygon, hull_normals
+from env2mjcf.geometry.shells.splitting import FlatPolygon, hull_normals
 
 AXES = np.eye(3)[:2]
 

@@ -20,10 +20,10 @@ from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.companions import write_path, write_query
-from env2mjcf.errors import DiagnosticLog
-from env2mjcf.geometry.cache import GeometryCache
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.geometry.store import GeometryCache
+from env2mjcf.system.files import replaced
 from env2mjcf.view import offscreen, picture
-from env2mjcf.writing import replaced
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX limits, permissions and mounts")
 GL = offscreen.backend() is not None

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parent.parent / "fuzz"
+FOLDER = Path(__file__).parent / "fuzz"
 sys.path.insert(0, str(FOLDER))
 
 from mutations import mutated, seeds  # noqa: E402

@@ -17,23 +17,21 @@ import numpy as np
 import pytest
 
 import env2mjcf
-from env2mjcf.batch.source import open_source
-from env2mjcf.cli.configurations import of_file
-from env2mjcf.errors import DiagnosticLog, Env2MjcfError
-from env2mjcf.formats.byu import read_byu
-from env2mjcf.formats.gms import read_gms
+from env2mjcf.companions.arrays import open_source
+from env2mjcf.companions.configurations import of_file
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Env2MjcfError
 from env2mjcf.formats.lexer import parse_integer
-from env2mjcf.formats.obj import read_obj
+from env2mjcf.formats.meshes.byu import read_byu, read_gms
+from env2mjcf.formats.meshes.obj import read_obj
 from env2mjcf.formats.path import read_path
-from env2mjcf.formats.query import read_query
 from env2mjcf.formats.roadmap import read_roadmap
+from env2mjcf.formats.rows import read_query
 from env2mjcf.formats.source import Source
-from env2mjcf.geometry.loading import load_mesh
-from env2mjcf.geometry.mesh import Mesh
+from env2mjcf.geometry.mesh import Mesh, load_mesh
 from env2mjcf.geometry.repair import repaired
+from env2mjcf.limits import Limits, TooMuchWorkError, Work
 from env2mjcf.linting import lint
-from env2mjcf.options import Limits
-from env2mjcf.work import TooMuchWorkError, Work
 
 BOX = "Boundary Box [0:1;0:1;0:1]\nMultibodies\n"
 CUBE = "1 8 12 36\n1 12\n" + "".join(f"{x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))

@@ -14,9 +14,9 @@ import env2mjcf
 from env2mjcf.cli.main import main
 from env2mjcf.formats import reading
 from env2mjcf.geometry import assembly, pieces, resolve, triangle_sweep
+from env2mjcf.geometry.coplanar import Polygon, convex_polygons
 from env2mjcf.geometry.pieces import prisms
-from env2mjcf.geometry.polygons import Polygon, convex_polygons
-from env2mjcf.options import LARGEST, Limits
+from env2mjcf.limits import LARGEST, Limits
 
 BOX = "Boundary Box [-9:9;-9:9;-9:9]\nMultibodies\n"
 ROBOT = "Active\n1\ncube.g Volumetric Rotational\nConnections\n0\n"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import env2mjcf
-from env2mjcf.errors import DiagnosticLog
+from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.formats.path import read_path
 from env2mjcf.formats.source import read_source
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.options import Limits
-from env2mjcf.transforms import rotation_matrix
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.kinematics.transforms import rotation_matrix
+from env2mjcf.limits import Limits
 
 SEED_ROBOT = """1
 MultiBody Active

@@ -14,7 +14,7 @@ from scenes import MODELS, box_mesh, free_cube, write_scene
 from test_space import MODEL_FILES
 
 import env2mjcf
-from env2mjcf.kinematics import RobotKinematics
+from env2mjcf.kinematics.forward import RobotKinematics
 
 
 @pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
@@ -208,7 +208,7 @@ def test_what_mujoco_refuses_is_told_by_the_line_of_the_env_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A real refusal: an inertia that no body can have."""
-    from env2mjcf.mjcf import bodies
+    from env2mjcf.mjcf import links as bodies
 
     path = write_scene(tmp_path, free_cube("5 0 0 0 0 0"))
     monkeypatch.setattr(

@@ -69,7 +69,7 @@ def read_g(path: Path) -> tuple[np.ndarray, list[list[int]]]:
     return vertices, [[abs(i) - 1 for i in p] for p in polygons]
 
 
-def read(scene: str) -> env2mjcf.model.Environment:
+def read(scene: str) -> env2mjcf.model.environment.Environment:
     """Read a scene with its robots and its query."""
     options = {
         k: [str(MODELS / v) for v in vs] if k == "robots" else str(MODELS / vs) for k, vs in SCENES[scene].items()

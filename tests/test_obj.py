@@ -11,11 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from env2mjcf.errors import DiagnosticLog, GeometryError, Severity
-from env2mjcf.formats.mesh_text import MeshArrays
-from env2mjcf.formats.obj import read_obj
-from env2mjcf.geometry.loading import READABLE, load_mesh
-from env2mjcf.options import Limits
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import GeometryError, Severity
+from env2mjcf.formats.meshes.obj import read_obj
+from env2mjcf.formats.meshes.text import MeshArrays
+from env2mjcf.geometry.mesh import READABLE, load_mesh
+from env2mjcf.limits import Limits
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 TETRAHEDRON_FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]

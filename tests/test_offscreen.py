@@ -12,9 +12,9 @@ from extras import needs
 from scenes import MODELS
 
 import env2mjcf
+from env2mjcf.system.files import replaced
 from env2mjcf.view import offscreen, picture
 from env2mjcf.view.offscreen import drawn
-from env2mjcf.writing import replaced
 
 SEED = MODELS / "seed" / "seed.env"
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")

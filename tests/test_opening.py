@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scenes import free_cube, write_scene
 
-from env2mjcf.opening import NoRegularFileError, open_regular
+from env2mjcf.system.files import NoRegularFileError, open_regular
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="POSIX pipes")
 MODELS = folders.ROOT / "models"

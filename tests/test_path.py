@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from env2mjcf.errors import Diagnostic, DiagnosticLog, FormatError
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Diagnostic, FormatError
 from env2mjcf.formats.path import ALL_ROBOTS, TURNS, PathFile, is_path, path_text, read_path
 from env2mjcf.formats.source import Source
 

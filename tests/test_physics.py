@@ -13,7 +13,7 @@ from scenes import MODELS, box_mesh, write_scene
 from simulations import Fall, fall, start
 
 import env2mjcf
-from env2mjcf.formats.byu import export_byu
+from env2mjcf.formats.meshes.byu import export_byu
 
 RADIUS = 0.15
 

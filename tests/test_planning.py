@@ -22,12 +22,12 @@ from env2mjcf.cli.main import main
 
 pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
-from env2mjcf.planning import PLANNERS, Plan, plan, plan_through, validity
-from env2mjcf.planning.bridge import state_space
+from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
+from env2mjcf.planning import planner_space as validity
+from env2mjcf.planning.ompl_bridge import state_space
+from env2mjcf.planning.planner_space import PlanningSpace, Validity
 from env2mjcf.planning.result import Progress
-from env2mjcf.planning.shortening import shortened
-from env2mjcf.planning.space import PlanningSpace
-from env2mjcf.planning.validity import Validity
+from env2mjcf.planning.segment import shortened
 
 MODELS = Path(__file__).parents[1] / "models"
 MAZE = MODELS / "maze" / "maze.xml"

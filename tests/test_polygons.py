@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from env2mjcf.formats.polygons import triangulate
+from env2mjcf.formats.meshes.polygons import triangulate
 
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
 # A square with a square hole, cut in along a bridge that is walked twice.

@@ -8,11 +8,11 @@ import pytest
 from texts import LEGACY, Reader, fault, write
 
 import env2mjcf
-from env2mjcf.errors import Diagnostic, DiagnosticLog, FormatError
-from env2mjcf.formats.query import read_query
-from env2mjcf.formats.rows import split_row
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Diagnostic, FormatError
+from env2mjcf.formats.rows import read_query, split_row
 from env2mjcf.formats.source import Source
-from env2mjcf.model import Task
+from env2mjcf.model.environment import Task
 
 
 def tasks(text: str, *dofs: int) -> tuple[tuple[Task, ...], list[Diagnostic]]:

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from strategies import Solid, laid_out, mesh_text, rich_environments, solids
 
 import env2mjcf
-from env2mjcf.errors import DiagnosticLog
-from env2mjcf.formats.byu import read_byu
-from env2mjcf.formats.obj import read_obj
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.formats.meshes.byu import read_byu
+from env2mjcf.formats.meshes.obj import read_obj
 from env2mjcf.formats.writers import env_text, robot_text
-from env2mjcf.model import Environment, JointType
-from env2mjcf.options import Limits
+from env2mjcf.limits import Limits
+from env2mjcf.model.environment import Environment, JointType
 
 SIZE = 25.0
 """Of meshes: poses of the random scenes lie within 100 of each other, so that some bodies touch and some do not."""

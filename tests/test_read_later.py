@@ -7,11 +7,11 @@ from math import inf, pi
 import pytest
 from texts import NON_HOLONOMIC, B, C, D, E, Reader, codes, fault, place, warnings
 
-from env2mjcf.dofs import DofKind
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
-from env2mjcf.options import Limits
-from env2mjcf.scaling import scaled
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.kinematics.tree import DofKind
+from env2mjcf.limits import Limits
+from env2mjcf.model.environment import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
+from env2mjcf.model.scaling import scaled
 
 
 @pytest.mark.parametrize(("text", "dialect"), [(B, "B"), (C, "C"), (D, "D"), (NON_HOLONOMIC, "D"), (E, "E")])

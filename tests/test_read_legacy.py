@@ -7,9 +7,9 @@ from math import pi
 import pytest
 from texts import LEGACY, LEGACY_FIXED, Reader, codes, fault, place, warnings
 
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BaseKind, DHForm, Dialect, JointType, MultiBodyKind, Recentring
-from env2mjcf.options import Limits
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.limits import Limits
+from env2mjcf.model.environment import BaseKind, DHForm, Dialect, JointType, MultiBodyKind, Recentring
 
 DEGREE = pi / 180
 

@@ -8,9 +8,9 @@ import pytest
 from texts import ROBOT, B, D, E, Reader, codes, fault, place, write
 
 import env2mjcf
-from env2mjcf.dofs import DofKind
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BaseKind, DHForm, Dialect, JointType
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.kinematics.tree import DofKind
+from env2mjcf.model.environment import BaseKind, DHForm, Dialect, JointType
 
 
 def test_the_sample_reads_without_warnings(read_robot: Reader) -> None:

@@ -12,9 +12,9 @@ from texts import PROBLEM, ROBOT, XML_ENVIRONMENT, XML_ROBOT, B, E, Reader, code
 
 import env2mjcf
 from env2mjcf.errors import Severity
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
-from env2mjcf.options import Limits
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.limits import Limits
+from env2mjcf.model.environment import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
 
 # Environments.
 

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 from meshes import box, channel, corpus_meshes, grid, joined, moved, rotation, soup, turned
 
-from env2mjcf.diagnostics import CATALOGUE
-from env2mjcf.errors import DiagnosticLog, GeometryError
+from env2mjcf.diagnostics import CATALOGUE, DiagnosticLog
+from env2mjcf.errors import GeometryError
 from env2mjcf.geometry.mesh import Mesh
 from env2mjcf.geometry.repair import repair_diagnostics, repaired
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from env2mjcf.errors import DiagnosticLog, GeometryError, Severity, Span
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import GeometryError, Severity, Span
 from env2mjcf.geometry import resolve
 from env2mjcf.geometry.resolve import resolve_all
-from env2mjcf.model import BaseKind, Body, Dialect, Environment, MultiBody, MultiBodyKind
+from env2mjcf.model.environment import BaseKind, Body, Dialect, Environment, MultiBody, MultiBodyKind
 from env2mjcf.options import Options
 
 

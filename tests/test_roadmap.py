@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from env2mjcf.errors import Diagnostic, DiagnosticLog, FormatError
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Diagnostic, FormatError
 from env2mjcf.formats.graph import Edge
 from env2mjcf.formats.roadmap import RoadmapFile, is_roadmap, read_roadmap, roadmap_text
 from env2mjcf.formats.source import Source

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from meshes import box, channel, corpus_meshes, grid, joined, moved, rotation, soup, tetrahedron, turned
 
-from env2mjcf.diagnostics import CATALOGUE
-from env2mjcf.errors import DiagnosticLog, GeometryError
+from env2mjcf.diagnostics import CATALOGUE, DiagnosticLog
+from env2mjcf.errors import GeometryError
 from env2mjcf.geometry.analysis import analyse
-from env2mjcf.geometry.hull import hull_volume
 from env2mjcf.geometry.mesh import Mesh
+from env2mjcf.geometry.pieces import hull_volume
 from env2mjcf.geometry.shapes import CollisionShape, ConvexPiece, collision_shape
-from env2mjcf.model import Recentring
+from env2mjcf.model.environment import Recentring
 
 SHELL = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
 MESH_GEOM = mujoco.mjtGeom.mjGEOM_MESH

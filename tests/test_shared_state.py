@@ -35,15 +35,15 @@ ALPHA = MODELS / "alpha" / "alpha.env"
 
 # All that changes in modules while they are used, and why that may be.
 CHANGING = {
-    "env2mjcf.contact.ending._at_work": "threads that are at rows just now: the interpreter waits for them at its end",
-    "env2mjcf.contact.remote._memory": "the scenes that a worker process was sent, by the digest of all they hold",
-    "env2mjcf.contact.remote._parcels": "scenes as bytes, while the scenes live",
-    "env2mjcf.forking._locks": "all locks, while they live: a forked child opens them",
-    "env2mjcf.contact.exact.compiled._loading": "held while numba is imported or compiles",
-    "env2mjcf.planning.planning._one_at_a_time": "held while OMPL plans: its random numbers are the process's",
-    "env2mjcf.geometry.cache._provenance": "a cache: the digest of the geometry code",
-    "env2mjcf.geometry.loading._READERS": "readers of meshes by file ending; filled on import",
-    "env2mjcf.planning.validity._remembered": "a cache of at most 512 read-only arrays, of 512 numbers at most",
+    "env2mjcf.system.locks._at_work": "threads that are at rows just now: the interpreter waits for them at its end",
+    "env2mjcf.contact.executors._memory": "the scenes that a worker process was sent, by the digest of all they hold",
+    "env2mjcf.contact.executors._parcels": "scenes as bytes, while the scenes live",
+    "env2mjcf.system.locks._locks": "all locks, while they live: a forked child opens them",
+    "env2mjcf.contact.exact.engine._loading": "held while numba is imported or compiles",
+    "env2mjcf.planning.plan_tasks._one_at_a_time": "held while OMPL plans: its random numbers are the process's",
+    "env2mjcf.geometry.store._provenance": "a cache: the digest of the geometry code",
+    "env2mjcf.geometry.mesh._READERS": "readers of meshes by file ending; filled on import",
+    "env2mjcf.planning.planner_space._remembered": "a cache of at most 512 read-only arrays, of 512 numbers at most",
     "env2mjcf.view.offscreen._backend": "a cache: the GL backend, by what MUJOCO_GL asks for",
     "env2mjcf.testing._numbered": "numbers of pictures, by the name of the test that failed",
 }
@@ -108,7 +108,7 @@ def test_modules_hold_no_state_but_what_is_listed_here(tmp_path: Path) -> None:
     everything(tmp_path)
     assert {n: repr(v) for n, v in tables().items() if n in constants} == constants
     listed = set(CHANGING) - set(tables())
-    assert listed <= {"env2mjcf.geometry.loading._READERS"}, "what is not there any more"
+    assert listed <= {"env2mjcf.geometry.mesh._READERS"}, "what is not there any more"
 
 
 def test_no_function_assigns_to_variables_of_its_module() -> None:
@@ -119,8 +119,8 @@ def test_no_function_assigns_to_variables_of_its_module() -> None:
 
 
 def test_nothing_of_a_scene_is_left_when_it_is_gone() -> None:
-    from env2mjcf import forking
-    from env2mjcf.contact import remote
+    from env2mjcf.contact import executors as remote
+    from env2mjcf.system import locks as forking
 
     def holdings() -> tuple[int, int, int]:
         gc.collect()

@@ -12,7 +12,7 @@ from meshes import table, voxels
 from scenes import write_scene
 
 import env2mjcf
-from env2mjcf.formats.byu import export_byu
+from env2mjcf.formats.meshes.byu import export_byu
 
 
 def plate(step: float) -> trimesh.Trimesh:

@@ -14,7 +14,7 @@ import pytest
 
 import env2mjcf
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "stress"))
+sys.path.insert(0, str(Path(__file__).parent / "stress"))
 
 if not Path("/proc/self/fd").is_dir():
     pytest.skip("what a process holds is read from /proc", allow_module_level=True)

@@ -12,17 +12,14 @@ import trimesh
 from meshes import box, channel, corpus_meshes, joined, moved, rotation, turned, voxels
 from scenes import MODELS
 
-from env2mjcf.diagnostics import CATALOGUE
-from env2mjcf.errors import DiagnosticLog
-from env2mjcf.geometry.hull import hull_volume
-from env2mjcf.geometry.loading import load_mesh
-from env2mjcf.geometry.mesh import Mesh
+from env2mjcf.diagnostics import CATALOGUE, DiagnosticLog
+from env2mjcf.geometry.mesh import Mesh, load_mesh
 from env2mjcf.geometry.orientation import winding_numbers
-from env2mjcf.geometry.pieces import ConvexPiece
+from env2mjcf.geometry.pieces import ConvexPiece, hull_volume
 from env2mjcf.geometry.repair import repaired
 from env2mjcf.geometry.shapes import CollisionShape, collision_shape
 from env2mjcf.geometry.shells import Shells, shells
-from env2mjcf.options import Limits
+from env2mjcf.limits import Limits
 
 PIN = 5e-6  # of the diagonal
 CORPUS_MESHES = [

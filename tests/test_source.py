@@ -12,9 +12,10 @@ import pytest
 from texts import LEGACY, B, Reader, codes, fault, place, warnings, write
 
 import env2mjcf
-from env2mjcf.errors import DiagnosticLog, FormatError
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import FormatError
 from env2mjcf.formats.source import Source, read_source
-from env2mjcf.options import Limits
+from env2mjcf.limits import Limits
 
 NOBODY = 65534
 

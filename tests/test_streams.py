@@ -13,7 +13,7 @@ import folders
 import pytest
 from scenes import free_cube, write_scene
 
-from env2mjcf.statuses import BAD_INPUT, DONE, FAULT, FINDING, WRONG_USAGE
+from env2mjcf.cli.program import BAD_INPUT, DONE, FAULT, FINDING, WRONG_USAGE
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 VALID, COLLIDING = "4 0 0 0 0 0", "0.5 0 0 0 0 0"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -146,8 +147,8 @@ TESTS = """
 import sys
 
 def test_start_is_cheap():
-    assert "_env2mjcf_pytest" in sys.modules
-    assert not {{"env2mjcf", "mujoco", "numpy", "trimesh"}} & set(sys.modules)
+    assert "env2mjcf.testing.pytest_plugin" in sys.modules
+    assert not {{"mujoco", "numpy", "trimesh"}} & set(sys.modules)
 
 def test_scene_is_loaded_once(load_scene):
     scene = load_scene(r"{scene}")
@@ -172,7 +173,9 @@ class TestPlugin:
         # The plugin is loaded by name, so that it does not matter how env2mjcf is installed here.
         monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
         monkeypatch.setenv("PYTHONPATH", str(ROOT))
-        return lambda *words: pytester.runpytest_subprocess("-p", "_env2mjcf_pytest", "-p", "no:cacheprovider", *words)
+        return lambda *words: pytester.runpytest_subprocess(
+            "-p", "env2mjcf.testing.pytest_plugin", "-p", "no:cacheprovider", *words
+        )
 
     def test_gives_scenes_and_readable_failures(self, run):
         result = run()
@@ -202,15 +205,11 @@ class TestPlugin:
 
     def test_is_an_entry_point_and_is_shipped(self):
         project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-        assert project["project"]["entry-points"]["pytest11"] == {"env2mjcf": "_env2mjcf_pytest"}
-        wheel = project["tool"]["hatch"]["build"]["targets"]["wheel"]
-        assert wheel["force-include"] == {"_env2mjcf_pytest.py": "_env2mjcf_pytest.py"}
-        assert (ROOT / "_env2mjcf_pytest.py").is_file()
+        assert project["project"]["entry-points"]["pytest11"] == {"env2mjcf": "env2mjcf.testing.pytest_plugin"}
+        assert importlib.util.find_spec("env2mjcf.testing.pytest_plugin")
 
     def test_imports_nothing_but_pytest(self):
-        code = (
-            "import sys, _env2mjcf_pytest; sys.exit(' '.join({'env2mjcf', 'numpy', 'mujoco'} & set(sys.modules)) or 0)"
-        )
+        code = "import sys, env2mjcf.testing.pytest_plugin; sys.exit(' '.join({'lxml', 'numpy', 'mujoco'} & set(sys.modules)) or 0)"
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         done = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False

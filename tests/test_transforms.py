@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from env2mjcf.model import DHForm, Pose
-from env2mjcf.transforms import (
+from env2mjcf.kinematics.transforms import (
     angles_from_quaternion,
     dh_matrix,
     inverse,
@@ -20,6 +19,7 @@ from env2mjcf.transforms import (
     rotation_matrix,
     wrap,
 )
+from env2mjcf.model.environment import DHForm, Pose
 
 ANGLES = st.tuples(*[st.floats(-4, 4)] * 3)
 

@@ -17,8 +17,8 @@ from texts import ENV_TEXTS, LEGACY, LEGACY_FIXED, NON_HOLONOMIC, PROBLEM, ROBOT
 
 import env2mjcf
 from env2mjcf.cli.main import main
-from env2mjcf.kinematics import RobotKinematics
-from env2mjcf.model import BoundaryShape, Dialect, Environment, JointType, MultiBodyKind
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.model.environment import BoundaryShape, Dialect, Environment, JointType, MultiBodyKind
 from env2mjcf.simulation.scene import Scene
 from env2mjcf.translation import Translation, translate, write_environment
 

@@ -16,9 +16,9 @@ from strategies import rich_environments
 from texts import PROBLEM, ROBOT, E, write
 
 import env2mjcf
-from env2mjcf import writing
 from env2mjcf.cli.main import main
-from env2mjcf.model import Environment
+from env2mjcf.model.environment import Environment
+from env2mjcf.system import files as writing
 from env2mjcf.translation import Written, write_environment
 
 CAR = "1\nPassive\n{} 0 2 0 0 0 90\n"

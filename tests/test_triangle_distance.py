@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from env2mjcf.geometry.hull import hull_triangles, hull_volume
-from env2mjcf.geometry.triangle_distance import nearest
+from env2mjcf.geometry.distance import nearest
+from env2mjcf.geometry.pieces import hull_triangles, hull_volume
 from env2mjcf.geometry.triangle_search import Jobs, Search
 from env2mjcf.geometry.triangle_sweep import escapes
 from env2mjcf.geometry.triangle_tree import forest

@@ -19,11 +19,13 @@ from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf import Scene
-from env2mjcf.view import web_server, wording
-from env2mjcf.view.dials import Dials
-from env2mjcf.view.judging import LiveJudge, Newest
-from env2mjcf.view.playback import Player, Track
-from env2mjcf.view.viewer import Viewer
+from env2mjcf.simulation.verdicts import LiveJudge
+from env2mjcf.view.web import page as wording
+from env2mjcf.view.web import server as web_server
+from env2mjcf.view.web.newest import Newest
+from env2mjcf.view.web.playback import Player, Track
+from env2mjcf.view.web.sliders import Dials
+from env2mjcf.view.web.viewer import Viewer
 
 ROOT = Path(__file__).parents[1]
 NOTHING = np.zeros((0, 6))
@@ -360,7 +362,7 @@ def test_no_other_verb_imports_what_the_page_is_made_of() -> None:
     code = (
         "import sys; from env2mjcf.cli.main import main\n"
         f"assert main(['check', {os.fspath(SEED)!r}, '--engine', 'mujoco']) == 0\n"
-        "import env2mjcf.cli.view, env2mjcf.view.viewer\n"
+        "import env2mjcf.cli.view, env2mjcf.view.web.viewer\n"
         "print(*{'viser', 'websockets', 'mujoco.viewer'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

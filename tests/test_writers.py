@@ -18,9 +18,8 @@ from strategies import environments, laid_out, rich_environments
 from texts import ENV_TEXTS, LEGACY, ROBOT, XML_ENVIRONMENT, XML_ROBOT, B, D, E, Reader, warnings, write
 
 import env2mjcf
-from env2mjcf.formats.writers import env_text, robot_text
-from env2mjcf.formats.writers.decimals import decimal, settled
-from env2mjcf.model import Environment, PlannerRules
+from env2mjcf.formats.writers import decimal, env_text, robot_text, settled
+from env2mjcf.model.environment import Environment, PlannerRules
 
 TEXTS = sorted((CORPUS / "texts").glob("*.env")) if CORPUS else []
 OWN = sorted(MODELS.glob("*/*.env"))

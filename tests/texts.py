@@ -10,7 +10,7 @@ import pytest
 
 import env2mjcf
 from env2mjcf.errors import Diagnostic, Severity
-from env2mjcf.model import Environment
+from env2mjcf.model.environment import Environment
 
 LEGACY = """#Environment Version 20020327
 2

@@ -1,6 +1,6 @@
 """Verdicts on files of configurations that may be larger than memory."""
 
-from .running import WHAT as WHAT
-from .running import BatchResult as BatchResult
-from .running import What as What
-from .running import run as run
+from .runner import WHAT as WHAT
+from .runner import BatchResult as BatchResult
+from .runner import What as What
+from .runner import run as run

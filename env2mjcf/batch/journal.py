@@ -29,8 +29,9 @@ import numpy as np
 from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
-from ..errors import ConversionError, DiagnosticLog
-from ..locking import FolderBusyError, LockOutcome, alone, try_lock, unlock
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError
+from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock, unlock
 
 _FORMAT = "env2mjcf batch 1"
 _BEGINNING = f'{{"format": "{_FORMAT}"'.encode()

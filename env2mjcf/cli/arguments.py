@@ -1,9 +1,13 @@
-"""From words of the command line to a verb, through tyro."""
+"""From words of the command line to a verb, through tyro.
+
+MERGED: Cameras and sizes of pictures, as words of the command line.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol, TypeVar
@@ -12,6 +16,7 @@ import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from ..options import Options, PathArgument
+from ..view.framing import DIRECTION_NAMES, Direction
 from .printing import one_line
 
 
@@ -104,3 +109,33 @@ def _paths_as_text() -> ConstructorRegistry:
         )
 
     return registry
+
+
+def camera_of(word: str | None) -> str | Direction | None:
+    """Return the camera that a word stands for: a name, or azimuth and elevation in degrees.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if word is None or word in DIRECTION_NAMES:
+        return word
+    try:
+        azimuth, elevation = (float(part) for part in word.split(","))
+    except ValueError:
+        azimuth = elevation = math.nan
+    if not (math.isfinite(azimuth) and -90 <= elevation <= 90):
+        names = ", ".join(DIRECTION_NAMES)
+        raise ValueError(f"--camera is {word}; expected {names}, or azimuth,elevation in degrees, as in 120,-35")
+    return Direction(math.radians(azimuth), math.radians(elevation))
+
+
+def size_of(word: str) -> tuple[int, int]:
+    """Return the width and height that a word stands for.
+
+    Raises:
+        ValueError: It is no size.
+    """
+    parts = word.lower().split("x")
+    if len(parts) != 2 or not all(p.isascii() and p.isdigit() and len(p) < 9 for p in parts):
+        raise ValueError(f"--size is {word}; expected width and height in pixels, as in 1280x960")
+    return int(parts[0]), int(parts[1])

@@ -15,10 +15,10 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..options import Options
-from ..statuses import DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .meter import Meter
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .program import DONE
 
 if TYPE_CHECKING:
     from ..batch import BatchResult
@@ -66,7 +66,7 @@ class Batch:
     def run(self) -> int:
         """Write the verdicts, and print how many there are of each kind."""
         from ..batch import run
-        from ..simulation.preparing import load
+        from ..simulation.loading import load
 
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"--threads is {self.threads}; expected at least 1")

@@ -9,9 +9,9 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
-from ..statuses import BAD_INPUT, DONE
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_json
+from .program import BAD_INPUT, DONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Cache:
         """Do it."""
         if self.action == "warm":
             return self._warm()
-        from ..geometry.cache import GeometryCache, default_folder
+        from ..geometry.store import GeometryCache, default_folder
 
         cache = GeometryCache(default_folder())
         before = cache.state()

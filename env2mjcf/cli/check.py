@@ -13,10 +13,10 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import ConversionError, DiagnosticLog
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError
 from ..options import Options
-from ..statuses import BAD_INPUT, DONE, FINDING
-from ..writing import refuse_unwritable
+from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .judgements import (
     Listed,
@@ -29,12 +29,13 @@ from .judgements import (
     verdict_lines,
 )
 from .printing import print_diagnostics, print_json, print_parts, working
+from .program import BAD_INPUT, DONE, FINDING
 
 if TYPE_CHECKING:
+    from ..companions.records import Configurations, Graph
     from ..simulation.edge_verdicts import EdgeJudge
     from ..simulation.scene import Scene
     from ..simulation.verdicts import Judge
-    from .rows import Configurations, Graph
 
 V = TypeVar("V")
 
@@ -85,9 +86,9 @@ class Check:
 
     def run(self) -> int:
         """Print a verdict on each configuration; 1 if any is invalid."""
-        from ..simulation.preparing import load
+        from ..simulation.loading import load
         from ..simulation.verdicts import Judge
-        from .graph_picture import draw
+        from ..view.graph_picture import draw
 
         if self.picture is not None and not self.picture.lower().endswith(".png"):
             raise ValueError(f"--picture is {self.picture}; expected a file that ends in .png")
@@ -143,7 +144,7 @@ class Check:
         return EdgeJudge(scene, graph.edges, self.resolution, self.certified, checked)
 
     def _rows(self, scene: Scene, log: DiagnosticLog) -> Configurations:
-        from .configurations import of_file, of_numbers, of_scene
+        from ..companions.configurations import of_file, of_numbers, of_scene
 
         words = self.configurations if self.options.query is None else (str(self.options.query),)
         if not words:

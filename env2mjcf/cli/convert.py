@@ -11,11 +11,11 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from ..names import file_stem
+from ..model.names import file_stem
 from ..options import Options
-from ..statuses import DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import one_line, print_diagnostics, print_json, working
+from .program import DONE
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,17 +11,18 @@ import tyro
 from rich.console import RenderableType
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog, Env2MjcfError
+from ..diagnostics import DiagnosticLog
+from ..errors import Env2MjcfError
 from ..options import Options
-from ..statuses import BAD_INPUT, DONE
 from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .columns import geometry_part, pairs_part, text_part
 from .printing import plain, print_diagnostics, print_json, print_parts, working
-from .tables import geometry_part, pairs_part, text_part
+from .program import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
-    from ..simulation.census import PairCount
+    from ..simulation.pair_counts import PairCount
     from ..simulation.scene import Scene
-    from .describing import SceneSummary
+    from ..summary import SceneSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class Info:
         if self.samples < 1:
             raise ValueError(f"--samples is {self.samples}; expected at least 1")
         from ..formats.reading import read_scene
-        from .describing import describe
+        from ..summary import describe
 
         chosen = Options.from_keywords(keywords(self.options))
         environment = read_scene(self.scene, chosen, DiagnosticLog(chosen.strict))
@@ -73,7 +74,7 @@ class Info:
         return BAD_INPUT if error else DONE
 
     def _load(self, options: Options) -> Scene | Env2MjcfError:
-        from ..simulation.preparing import prepare
+        from ..simulation.loading import prepare
 
         try:
             with working(f"loading {self.scene}"):
@@ -103,7 +104,7 @@ class Info:
                 yield from pairs_part(self._counts(scene), self.samples)
 
     def _counts(self, scene: Scene) -> tuple[PairCount, ...]:
-        from ..simulation.census import count_touching
+        from ..simulation.pair_counts import count_touching
 
         with working(f"looking at {self.samples} configurations"):
             return count_touching(scene, self.samples)

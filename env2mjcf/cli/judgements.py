@@ -14,9 +14,9 @@ from tqdm import tqdm
 from .printing import one_line, plain
 
 if TYPE_CHECKING:
+    from ..companions.records import Graph, Poses
     from ..simulation.edge_verdicts import EdgeJudge, EdgeVerdict
     from ..simulation.verdicts import Judge, Verdict
-    from .rows import Graph, Poses
 
 V = TypeVar("V")
 

@@ -14,9 +14,9 @@ from tyro.conf import Positional
 
 from ..errors import Diagnostic, Severity
 from ..options import Options
-from ..statuses import BAD_INPUT, DONE, FINDING
 from .arguments import OptionFlags, Output, OutputFlags
 from .printing import one_line, print_diagnostic, print_json, printable
+from .program import BAD_INPUT, DONE, FINDING
 
 if TYPE_CHECKING:
     from ..linting import LintResult

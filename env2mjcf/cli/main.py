@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 
-from .. import faults, starting
 from ..errors import Env2MjcfError, did_you_mean
-from ..statuses import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE
-from ..streams import ResultsError
 from ..view.offscreen import RenderError, refuse_unknown
+from . import program
 from .arguments import Verb, parse
 from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
+from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
 
 # Each verb: its module here, its class there, what it does.
 VERBS = {
@@ -63,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
-    starting.end_tidily()
+    program.end_tidily()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         tame_libraries()  # the process is the program's own
@@ -82,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _complain(f"the results cannot be written to standard output: {error.strerror}")
         return BAD_INPUT
     except KeyboardInterrupt:
-        return starting.interrupted_status()
+        return program.interrupted_status()
     except Exception as error:
         return _fault(error)
     return status
@@ -132,8 +131,8 @@ def _run(name: str, verb: Verb) -> int:
     except (BrokenPipeError, ResultsError):
         raise
     except Exception as error:
-        if starting.interrupted:
-            return starting.interrupted_status()
+        if program.interrupted:
+            return program.interrupted_status()
         # Options are refused with just these; what derives from them (LinAlgError, UnicodeError) is a fault.
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
@@ -144,10 +143,10 @@ def _run(name: str, verb: Verb) -> int:
 
 def _fault(error: Exception, debug: bool = False) -> int:
     """Report what should not have happened, unless it happened because of Ctrl-C, which libraries turn into others."""
-    if starting.interrupted:
-        return starting.interrupted_status()
+    if program.interrupted:
+        return program.interrupted_status()
     _show_traceback(debug)
-    _complain(faults.describe(error))
+    _complain(program.describe(error))
     return FAULT
 
 

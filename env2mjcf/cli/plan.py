@@ -13,14 +13,15 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog, FormatError
+from ..companions.configurations import refuse_without_freedom
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError
 from ..formats.path import begins_as_path
 from ..options import Options, PathArgument
-from ..statuses import DONE, FINDING
-from ..writing import refuse_foreign, refuse_unwritable
+from ..system.files import refuse_foreign, refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .configurations import refuse_without_freedom
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .program import DONE, FINDING
 
 if TYPE_CHECKING:
     from ..planning.result import Plan as Result
@@ -78,9 +79,9 @@ class Plan:
 
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
-        from ..planning.names import installed
-        from ..planning.planning import plan_through
-        from ..simulation.preparing import load
+        from ..planning.plan_tasks import plan_through
+        from ..planning.planners import installed
+        from ..simulation.loading import load
 
         # Before anything is loaded and looked at, which may take a minute.
         installed(self.planner)
@@ -100,7 +101,7 @@ class Plan:
         if (wrong := _wrong(scene, query)) is not None:
             self._say_wrong(wrong, log)
             return FINDING
-        from .planning_meter import PlanningMeter
+        from .meter import PlanningMeter
 
         with PlanningMeter(self.time) as meter:
             result = plan_through(
@@ -177,7 +178,7 @@ def dense(scene: Scene, result: Result) -> np.ndarray:
 
 def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
     """Return which configurations of the query are not valid, and why; None if all are."""
-    from ..planning.planning import names_of
+    from ..planning.plan_tasks import names_of
     from ..simulation.verdicts import Judge
 
     judge = Judge(scene, query.q, names_of(len(query.q)))

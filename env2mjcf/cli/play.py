@@ -14,13 +14,12 @@ from rich.text import Text
 from tqdm import tqdm
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..options import Options
-from ..statuses import DONE
-from ..writing import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .cameras import camera_of, size_of
+from ..system.files import refuse_unwritable
+from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .program import DONE
 
 if TYPE_CHECKING:
     from ..contact.types import Contact
@@ -73,11 +72,10 @@ class Play:
 
     def run(self) -> int:
         """Write the film, and say what touches in it."""
-        from ..simulation.preparing import load
-        from ..view.encoding import encoder
-        from ..view.films import film
+        from ..companions.configurations import of_file
+        from ..simulation.loading import load
+        from ..view.films import encoder, film
         from ..view.shots import checked_size
-        from .configurations import of_file
 
         camera, size = camera_of(self.camera), size_of(self.size)
         encoder(self.out, self.fps)

@@ -10,17 +10,16 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..options import Options
-from ..statuses import DONE
-from ..writing import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .cameras import camera_of, size_of
+from ..system.files import refuse_unwritable
+from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
 from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .program import DONE
 
 if TYPE_CHECKING:
+    from ..kinematics.transforms import Array
     from ..simulation.scene import Scene
-    from ..transforms import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +64,7 @@ class Render:
 
     def run(self) -> int:
         """Draw, and say where the picture is."""
-        from ..simulation.preparing import load
+        from ..simulation.loading import load
         from ..view.pictures import picture
 
         if not self.out.lower().endswith(".png"):
@@ -93,13 +92,13 @@ class Render:
         return DONE
 
     def _rows(self, scene: Scene) -> Array:
-        from .configurations import of_numbers
+        from ..companions.configurations import of_numbers
 
         if self.config:
             return of_numbers(scene, [str(x) for x in self.config], self.radians).q
         return scene.queries[0].q if scene.queries else scene.space.home[None]
 
     def _trail(self, scene: Scene, log: DiagnosticLog) -> Array:
-        from .configurations import of_file
+        from ..companions.configurations import of_file
 
         return np.asarray(of_file(scene, str(self.trail), self.radians, self.options.limits, log).q)

@@ -10,14 +10,15 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..errors import DiagnosticLog
-from ..options import LARGEST, DialectName, Limits, PathArgument, Semantics
-from ..statuses import DONE
+from ..diagnostics import DiagnosticLog
+from ..limits import LARGEST, Limits
+from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
 from .printing import one_line, print_diagnostics, print_json, print_parts
+from .program import DONE
 
 if TYPE_CHECKING:
-    from ..model import Boundary, Environment
+    from ..model.environment import Boundary, Environment
     from ..translation import Written
 
 
@@ -89,7 +90,7 @@ class Translate:
         return DONE
 
     def _boundary(self) -> Boundary | None:
-        from ..model import Boundary, BoundaryShape
+        from ..model.environment import Boundary, BoundaryShape
 
         if self.box is None:
             return None

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 from tyro.conf import Positional
 
-from .. import starting
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..options import Options, PathArgument
-from ..statuses import DONE
+from . import program
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .printing import one_line, print_diagnostics, print_json, working
+from .program import DONE
 
 if TYPE_CHECKING:
+    from ..kinematics.transforms import Array
     from ..simulation.scene import Scene
-    from ..transforms import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +58,16 @@ class View:
 
     def run(self) -> int:
         """Show the scene until Ctrl-C."""
-        from ..view import native, web_server
+        from ..view import native
+        from ..view.web import server
 
         if self.native:
             native.require_display()
             if self.path is not None:
                 raise ValueError("--native plays no path: leave one of --native and --path out")
         else:
-            web_server.require()
-        from ..simulation.preparing import load
+            server.require()
+        from ..simulation.loading import load
 
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))
@@ -80,8 +81,8 @@ class View:
         return self._serve(scene, path, log)
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
-        from ..view.playback import doubts
-        from .configurations import of_file
+        from ..companions.configurations import of_file
+        from ..view.web.playback import doubts
 
         found = of_file(scene, str(self.path), False, self.options.limits, log)
         if found.graph is not None and found.graph.kind != "path":
@@ -90,12 +91,12 @@ class View:
         return found.q
 
     def _serve(self, scene: Scene, path: Array | None, log: DiagnosticLog) -> int:
-        from ..view import web_server
-        from ..view.viewer import Viewer
+        from ..view.web import server
+        from ..view.web.viewer import Viewer
 
-        port = web_server.free_port(self.port)
+        port = server.free_port(self.port)
         try:
-            with web_server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as server:
+            with server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as server:
                 viewer = Viewer(server, scene, path)
                 self._announce(server.get_port(), log)
                 try:
@@ -104,7 +105,7 @@ class View:
                     viewer.close()
         except KeyboardInterrupt:
             pass
-        return DONE if starting.interrupted in (0, signal.SIGINT) else starting.interrupted_status()
+        return DONE if program.interrupted in (0, signal.SIGINT) else program.interrupted_status()
 
     def _announce(self, port: int, log: DiagnosticLog) -> None:
         url = f"http://127.0.0.1:{port}"

@@ -6,10 +6,10 @@ import re
 
 import numpy as np
 
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..formats.lexer import parse_number
+from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
-from ..transforms import Array
 from .roadmaps import Roadmap
 
 _STRAIGHT = re.compile(r"straight\w*", re.IGNORECASE)

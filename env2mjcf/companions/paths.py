@@ -9,15 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import Diagnostic, DiagnosticLog, FormatError
+from ..diagnostics import DiagnosticLog
+from ..errors import Diagnostic, FormatError
 from ..formats import path as text
 from ..formats.source import Source, read_source
-from ..inverse_kinematics import configuration_of_poses, pose_gaps
-from ..model import BaseKind, Dialect
-from ..options import Limits, PathArgument
+from ..kinematics.inverse import configuration_of_poses, pose_gaps
+from ..kinematics.transforms import Array, rotation_matrix, transform
+from ..limits import Limits
+from ..model.environment import BaseKind, Dialect
+from ..options import PathArgument
 from ..simulation.scene import Scene
-from ..transforms import Array, rotation_matrix, transform
-from .numbers import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832

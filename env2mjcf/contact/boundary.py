@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
-from ..model import Boundary
-from ..transforms import Array
+from ..kinematics.transforms import Array
+from ..model.environment import Boundary
 
 ROUNDING = 1e-12
 """Of a vertex that lies exactly on the boundary, as a fraction of the boundary's size."""

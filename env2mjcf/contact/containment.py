@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
 from ..geometry.orientation import winding_numbers
+from ..kinematics.transforms import Array
 from ..pairs import Pair
-from ..transforms import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.assembly import Part
+from ..geometry.distance import nearest
 from ..geometry.topology import Floats
-from ..geometry.triangle_distance import nearest
 from ..geometry.triangle_search import Jobs, Search
+from ..kinematics.transforms import Array
 from ..pairs import Pair
-from ..transforms import Array
 from .clearance import Clearance
 from .separation import separations
 from .surfaces import Surface, Surfaces, unit_normals

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,23 +12,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..forking import Lock, lasting
 from ..geometry.assembly import Part
+from ..kinematics.transforms import Array
 from ..options import Collision, Engine
 from ..pipeline import Compiled
-from ..transforms import Array
-from .advancement import certified
+from ..system.locks import Lock, lasting
 from .boundary import BoundaryTest
 from .clearance import Clearance
 from .containment import Containment
-from .engine import MujocoEngine
+from .edges import EdgeSteps, MotionBounds, certified
 from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
-from .motion import MotionBounds
-from .paths import EdgeSteps
-from .static_pairs import static_contacts
+from .mujoco_engine import MujocoEngine, static_contacts
 from .surfaces import Surfaces
-from .types import Contact
+from .types import Contact, PackedContacts
 
 # Bodies nearer than this, in extents, may touch by the verdicts (design: section 6).
 _BAND = 1e-5
@@ -284,3 +282,34 @@ class _Triangles:
     moving: Clearance
     constant: Clearance
     manifolds: Manifolds
+
+
+def packed(queries: ContactQueries, rows: Array, engine: Engine | None = None) -> PackedContacts:
+    """Return the contacts of configurations (n, dim)."""
+    each = [queries.contacts(row, engine) for row in rows]
+    found = [c for contacts in each for c in contacts]
+    return PackedContacts(
+        np.cumsum([0, *(len(contacts) for contacts in each)], dtype=np.int64),
+        np.array([queries.pair_index(c) for c in found], dtype=np.int64),
+        _vectors([c.position for c in found]),
+        _vectors([c.normal for c in found]),
+        np.array([c.distance for c in found], dtype=np.float64),
+    )
+
+
+def joined(parts: Sequence[PackedContacts]) -> PackedContacts:
+    """Put the contacts of consecutive chunks together."""
+    if not parts:
+        return PackedContacts(np.zeros(1, np.int64), np.zeros(0, np.int64), _vectors([]), _vectors([]), np.zeros(0))
+    counts = np.concatenate([np.diff(p.offsets) for p in parts])
+    return PackedContacts(
+        np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
+        np.concatenate([p.pair for p in parts]),
+        np.concatenate([p.position for p in parts]),
+        np.concatenate([p.normal for p in parts]),
+        np.concatenate([p.distance for p in parts]),
+    )
+
+
+def _vectors(rows: list[Array]) -> Array:
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)

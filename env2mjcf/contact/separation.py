@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 
+from ..geometry.distance import nearest
 from ..geometry.topology import Bools, Floats, Ints
-from ..geometry.triangle_distance import nearest
 from ..geometry.triangle_search import Jobs, Search
 from ..geometry.triangle_sweep import escapes
 from .surfaces import Surface, Surfaces, unit, unit_normals

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..geometry.assembly import Part
 from ..geometry.convexity import Box
-from ..geometry.hull import hull_triangles
 from ..geometry.orientation import winding_numbers
+from ..geometry.pieces import hull_triangles
 from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs
 from ..geometry.triangle_tree import Forest, forest

@@ -1,12 +1,28 @@
-"""The bodies of dialects B to E: options, mass, base and pose (env-format sections 5 to 8)."""
+"""The bodies of dialects B to E: options, mass, base and pose (env-format sections 5 to 8).
+
+MERGED: Connections: tag, count, joint type, limits (env-format sections 4.1, 5 and 6).
+"""
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
 
-from ..model import BaseKind, Body, Pose, Recentring
-from .blocks import Grammar, read_color, read_pose, with_directives
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span
+from ..model.environment import (
+    BaseKind,
+    Body,
+    Connection,
+    DHParameters,
+    Dialect,
+    JointLimits,
+    JointType,
+    Pose,
+    Recentring,
+    SMAShape,
+)
+from .blocks import Grammar, is_multibody_tag, read_color, read_counted, read_dh, read_pose, read_range, with_directives
 from .lexer import Scanner, Token, misspelling
 
 _BASES = {"Planar": "Planar", "Volumetric": "Volumetric", "Fixed": "Fixed", "Joint": "Joint"}
@@ -114,3 +130,141 @@ def _read_base(scan: Scanner, grammar: Grammar) -> tuple[BaseKind, Pose | None]:
     if word == "Joint":
         return BaseKind.JOINT, None
     return BaseKind(f"{word} {scan.keyword(_MOVEMENTS, 'movement', code='ENV123')}"), None
+
+
+# A hinge between -2 pi and 2 pi is still meant; beyond that the limits are hardly fractions of pi.
+_SUSPICIOUS_LIMIT = 2.0
+
+SELF_CONNECTION = "a connection from body {} to itself; expected two bodies"
+
+_LEGACY_JOINTS = {"Revolute": JointType.REVOLUTE, "Prismatic": JointType.PRISMATIC}
+_LATER_JOINTS = {j.value: j for j in JointType}
+_LIMIT_COUNT = {JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}
+_LIMIT_NEXT = re.compile(r"[+-]?[0-9.]\S*\s*:")
+_CONNECTION_TAGS = ("Connections", "Connection")
+
+
+def read_connections(scan: Scanner, grammar: Grammar, bodies: int) -> tuple[Connection, ...]:
+    """Read a tag, a count and connections."""
+    _read_connection_tag(scan, grammar)
+    return read_counted(
+        scan, "connection", scan.limits.connections, lambda: read_connection(scan, grammar, bodies)
+    )  # fmt: skip
+
+
+def read_connection(scan: Scanner, grammar: Grammar, bodies: int) -> Connection:
+    """Read one connection, its fields in the dialect's order (env-format sections 4.1 and 5)."""
+    start = scan.position
+    previous = read_body_index(scan, bodies)
+    following = read_body_index(scan, bodies)
+    span = scan.span(start)
+    if previous == following:
+        scan.fail(
+            "ENV116", SELF_CONNECTION.format(previous), hint="a connection leads from a parent to its child", span=span
+        )
+    joint, limits, sma, actuated = JointType.REVOLUTE, (), None, None
+    poses: dict[str, Pose] = {}
+    dh = DHParameters()
+    for name in grammar.rules.connection_fields:
+        if name == "actuated":
+            actuated = scan.word("a tag such as Actuated").text
+        elif name == "joint":
+            joint = _read_joint(scan, grammar)
+        elif name == "limits":
+            limits = _read_all_limits(scan, grammar, joint)
+        elif name == "dh":
+            dh = read_dh(scan, grammar)
+            if joint is JointType.SMA:
+                sma = SMAShape(*scan.numbers("length width"))
+        else:
+            poses[name] = read_pose(scan, grammar)
+    return Connection(previous, following, joint, poses["to_dh"], dh, poses["to_body"], limits, actuated, sma, span)
+
+
+def read_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> JointLimits:
+    """Read one `lower:upper` of a joint: lengths for a slide, else fractions of pi (env-format section 12)."""
+    start = scan.position
+    lower, upper = read_range(scan, "a joint's limits")
+    span = scan.span(start)
+    if joint is JointType.PRISMATIC:
+        return JointLimits(lower, upper, span)
+    if max(abs(lower), abs(upper)) > _SUSPICIOUS_LIMIT:
+        scan.log.warn(
+            FormatError, "ENV305", joint.value,
+            f"limits {lower:g}:{upper:g} are fractions of pi, here more than a whole turn either way",
+            hint="write -1:1 for a whole turn", span=span,
+        )  # fmt: skip
+    unit = grammar.rules.configuration_angle
+    return JointLimits(lower * unit, upper * unit, span)
+
+
+def read_body_index(scan: Scanner, bodies: int) -> int:
+    """Read the index of one of a multibody's bodies."""
+    start = scan.position
+    index = scan.integer("the index of a body")
+    if not 0 <= index < bodies:
+        scan.fail(
+            "ENV115",
+            f"body index {index} is out of range; this multibody has {bodies} bodies, 0 to {bodies - 1}",
+            hint="bodies are counted from 0 in the order of the file", span=scan.span(start),
+        )  # fmt: skip
+    return index
+
+
+def warn_of_no_limits(log: DiagnosticLog, grammar: Grammar, joint: JointType, span: Span) -> None:
+    """Warn that a joint has no limits in a dialect that demands them."""
+    unbounded = joint is JointType.PRISMATIC
+    log.warn(
+        FormatError, "ENV204", joint.value,
+        f"{joint.value} without limits in dialect {grammar.dialect}; expected min:max, read as "
+        f"{'unbounded' if unbounded else '-1:1'}",
+        hint="write the limits behind the joint type" if unbounded else "write -1:1", span=span,
+    )  # fmt: skip
+
+
+def _read_connection_tag(scan: Scanner, grammar: Grammar) -> None:
+    start = scan.position
+    word = scan.peek_word()
+    tag = next((t for t in _CONNECTION_TAGS if t.lower() == word.lower()), None) or misspelling(word, _CONNECTION_TAGS)
+    if tag is None and not grammar.rules.plural_connections and word.isalpha() and not is_multibody_tag(word):
+        # The readers of A, B and early C take any word here.
+        scan.word("a tag")
+        scan.log.warn(
+            FormatError, "ENV202", word, f"{word!r} stands where 'Connections' was expected", hint="write Connections",
+            span=scan.span(start),
+        )  # fmt: skip
+        return
+    tag = scan.keyword({t: t for t in _CONNECTION_TAGS}, "tag")
+    if tag == "Connection" and grammar.rules.plural_connections:
+        scan.log.warn(
+            FormatError, "ENV205", tag, f"dialect {grammar.dialect} spells this tag 'Connections'",
+            hint="write Connections", span=scan.span(start),
+        )  # fmt: skip
+
+
+def _read_joint(scan: Scanner, grammar: Grammar) -> JointType:
+    legacy = grammar.dialect is Dialect.A
+    start = scan.position
+    joint = scan.keyword(
+        _LEGACY_JOINTS if legacy else _LATER_JOINTS, "joint type", code="ENV121", exact_case=grammar.rules.keyword_case
+    )
+    if joint is JointType.PRISMATIC:
+        scan.log.info(
+            "ENV304", "Prismatic",
+            "a Prismatic connection slides along the DH z axis, its value replacing d; "
+            "the original planner turned it by theta instead"
+            if legacy else "Prismatic is not a joint type of the original planner in this dialect; read as a slide",
+            span=scan.span(start),
+        )  # fmt: skip
+    return joint
+
+
+def _read_all_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> tuple[JointLimits, ...]:
+    count = _LIMIT_COUNT.get(joint, 0)
+    if not count:
+        return ()
+    if scan.next_matches(_LIMIT_NEXT):
+        return tuple(read_limits(scan, grammar, joint) for _ in range(count))
+    if grammar.dialect is not Dialect.B:
+        warn_of_no_limits(scan.log, grammar, joint, scan.span())
+    return ()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
-from ..model import Dialect
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span, did_you_mean
+from ..model.environment import Dialect
 from .lexer import misspelling
 from .source import Source
 

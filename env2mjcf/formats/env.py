@@ -1,17 +1,20 @@
-"""Reads the text of an environment in any of the five dialects."""
+"""Reads the text of an environment in any of the five dialects.
+
+MERGED: Dialect E robot text files (env-format section 8.2).
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FormatError
-from ..model import Boundary, Dialect, Environment, MultiBody, Resolution
-from . import later, legacy
-from .blocks import Grammar, check_limit, is_multibody_tag, warn_of_count
-from .boundary import read_boundary
+from ..model.environment import Boundary, Dialect, Environment, MultiBody, Resolution
+from .blocks import Grammar, check_limit, is_multibody_tag, read_boundary, warn_of_count
 from .lexer import Scanner
+from .multibodies import read_multibody, read_multibody_of_a, read_robot_bodies
 
 _RESOLUTION_TAGS = {
     "PositionRes": "position",
@@ -96,7 +99,7 @@ def _read_multibodies(scan: Scanner, grammar: Grammar) -> tuple[tuple[MultiBody,
     start = scan.position
     declared = scan.count("the number of multibodies", scan.limits.bodies, "bodies")
     span = scan.span(start)
-    read = legacy.read_multibody if grammar.dialect is Dialect.A else later.read_multibody
+    read = read_multibody_of_a if grammar.dialect is Dialect.A else read_multibody
     found: list[MultiBody] = []
     bodies = connections = 0
     while not scan.at_end():
@@ -132,3 +135,38 @@ def _check_ending(scan: Scanner, grammar: Grammar) -> None:
             scan.log.warn(FormatError, "ENV210", scan.source.path, message, hint=hint, span=span)
         else:
             scan.log.info("ENV210", scan.source.path, message, hint=hint, span=span)
+
+
+_COUNT_AND_WORD = re.compile(r"[0-9]+\s+([A-Za-z]+)(?!\S)")
+
+
+def read_robot(scan: Scanner) -> MultiBody:
+    """Read a `.robot` file: a count, bodies, adjacencies and connections.
+
+    Raises:
+        FormatError: The text breaks the grammar.
+    """
+    _refuse_environment(scan)
+    if scan.peek_word().lower() == "active":
+        # Some robot files begin with the tag that a multibody has.
+        scan.log.warn(
+            FormatError, "ENV211", "Active", "a robot file begins with its body count, not with a tag",
+            hint="remove the tag", span=scan.span(),
+        )  # fmt: skip
+        scan.word("Active")
+    robot = read_robot_bodies(scan, Grammar.of(Dialect.E))
+    if not scan.at_end():
+        scan.log.warn(
+            FormatError, "ENV209", scan.source.path, "text behind the last connection is not used",
+            hint="begin comment lines with '#'", span=scan.span(),
+        )  # fmt: skip
+    return replace(robot, robot_file=scan.source.path)
+
+
+def _refuse_environment(scan: Scanner) -> None:
+    behind_count = scan.next_matches(_COUNT_AND_WORD)
+    if scan.peek_word().lower() == "boundary" or (behind_count and is_multibody_tag(behind_count.group(1))):
+        scan.fail(
+            "ENV133", f"{scan.source.path} is an environment, not a robot file; expected a number of bodies",
+            hint="robots= (--robots) takes dialect E robot files; an environment brings its own robots",
+        )  # fmt: skip

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NoReturn
 
-from ..errors import DiagnosticLog, FormatError
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError
 from .lexer import parse_integer
 from .rows import check_rows, coordinate, coordinate_hint
 from .source import Source

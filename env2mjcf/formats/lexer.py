@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
-from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
-from ..model import Comment
-from ..options import Limits
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span, did_you_mean
+from ..limits import Limits
+from ..model.environment import Comment
 from .source import Source
 
 T = TypeVar("T")

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import DiagnosticLog, FormatError, Span
-from ..transforms import Array
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span
+from ..kinematics.transforms import Array
 from .lexer import parse_number
 from .rows import Extra, Line, Row, fitting, judge_rows, number_lines, parse_row, regrouped, row_text
 from .source import Source

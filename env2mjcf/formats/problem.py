@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import FormatError, did_you_mean
-from ..model import Boundary, BoundaryShape, PlannerRules
+from ..model.environment import Boundary, BoundaryShape, PlannerRules
 from .blocks import read_coordinate
 from .lexer import Scanner
 from .xml import Node

@@ -9,21 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..dofs import build_tree, degrees_of_freedom
-from ..errors import DiagnosticLog, FormatError, Span
-from ..model import Dialect, Environment, MultiBody, Task
-from ..options import Limits, Options, PathArgument
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span
+from ..kinematics.tree import build_tree, degrees_of_freedom
+from ..limits import Limits
+from ..model.environment import Dialect, Environment, MultiBody, Task
+from ..options import Options, PathArgument
 from . import xml_scene
 from .detect import detect, is_xml
-from .env import read_env
+from .env import read_env, read_robot
 from .lexer import Scanner
 from .problem import Problem, ProblemTask, read_problem
-from .query import read_query
-from .robot import read_robot
-from .rows import split_row
+from .rows import read_query, split_row
 from .source import Source, read_source
-from .xml import Node
-from .xml_parsing import parse_xml
+from .xml import Node, parse_xml
 
 _PROBLEM_TAGS = ("motionplanning", "motion_planning", "mpproblem", "problem")
 

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from ..errors import DiagnosticLog, FormatError, Span
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span
 from .graph import Node, read_nodes
 from .rows import row_text
 from .source import Source

@@ -10,9 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, NoReturn
 
-from ..errors import DiagnosticLog, FormatError, Span, did_you_mean
-from ..opening import open_regular
-from ..options import Limits, PathArgument
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span, did_you_mean
+from ..limits import Limits
+from ..options import PathArgument
+from ..system.files import open_regular
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
 DOTS = "..."

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import FormatError
-from ..model import (
+from ..model.environment import (
     Actuator,
     BaseKind,
     Body,
@@ -21,9 +21,8 @@ from ..model import (
     Pose,
     Recentring,
 )
-from .blocks import Grammar, read_color, read_dh, read_pose
-from .boundary import SHAPES, read_extent
-from .connections import SELF_CONNECTION, read_body_index, read_limits, warn_of_no_limits
+from .blocks import SHAPES, Grammar, read_color, read_dh, read_extent, read_pose
+from .bodies import SELF_CONNECTION, read_body_index, read_limits, warn_of_no_limits
 from .lexer import Scanner
 from .xml import Node
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import DiagnosticLog, GeometryError, Span
-from ..work import Work
-from .cleaning import cleaned
+from ..diagnostics import DiagnosticLog
+from ..errors import GeometryError, Span
+from ..limits import Work
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
 from .orientation import inside_out, rewound, wound_alike
-from .topology import RELATIVE_TOLERANCE, Floats, Ints, edges, face_areas, face_components, face_volumes
+from .topology import RELATIVE_TOLERANCE, Floats, Ints, cleaned, edges, face_areas, face_components, face_volumes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,23 +9,22 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..errors import ConversionError, DiagnosticLog, GeometryError
-from ..kinematics import RobotKinematics
-from ..model import Body, Environment, JointType, MultiBody, Recentring
-from ..names import body_names
-from ..options import LARGEST, Limits, Options
-from ..transforms import Array
-from ..work import Work
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError, GeometryError
+from ..kinematics.forward import RobotKinematics
+from ..kinematics.transforms import Array
+from ..limits import LARGEST, Limits, Work, bounded
+from ..model.environment import Body, Environment, JointType, MultiBody, Recentring
+from ..model.names import body_names
+from ..options import Options
 from .analysis import Analysis
-from .bounded import bounded
-from .cache import GeometryCache, default_folder
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
-from .loading import load_mesh
-from .mesh import Mesh
+from .mesh import Mesh, load_mesh
 from .repair import Repaired, repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
+from .store import GeometryCache, default_folder
 
 # Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
 _THICKNESS_PER_EXTENT = 5e-6

@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import DiagnosticLog
-from .cache import GeometryCache
+from ..diagnostics import DiagnosticLog
 from .distance import distances, spread
-from .hull import hull_faces, hull_volume
 from .orientation import winding_numbers
+from .pieces import hull_faces, hull_volume
 from .shapes import CollisionShape
+from .store import GeometryCache
 from .topology import Bools, Floats, Ints
 
 APPROXIMATE = ("hull", "coacd")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .analysis import Analysis
+from .coplanar import PARALLEL
 from .planar import triangulated
-from .polygons import PARALLEL
 from .topology import Bools, Edges, Floats, Ints, connected, edges
 
 _MOST_FACES = 1000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..work import Work
+from ..limits import Work
 from .topology import Bools, Edges, Floats, Ints, connected, edges
 
 _BLOCK = 2_000_000  # solid angles held in memory at once

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import DiagnosticLog, GeometryError, Span
-from ..work import COSTLY, Work
+from ..diagnostics import DiagnosticLog
+from ..errors import GeometryError, Span
+from ..limits import COSTLY, Work
 from .analysis import Analysis, analyse, mesh_diagnostics
 from .folds import unfolded
 from .mesh import Mesh

@@ -6,8 +6,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from ..errors import DiagnosticLog, GeometryError, Span, did_you_mean
-from ..model import Environment
+from ..diagnostics import DiagnosticLog
+from ..errors import GeometryError, Span, did_you_mean
+from ..model.environment import Environment
 from ..options import Options
 
 # Missing names for which the nearest one is looked for.

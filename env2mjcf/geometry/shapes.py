@@ -8,18 +8,18 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import DiagnosticLog, GeometryError, Span
+from ..diagnostics import DiagnosticLog
+from ..errors import GeometryError, Span
+from ..limits import Work
 from ..options import Collision
-from ..work import Work
 from .analysis import Analysis, refuse_without_area
-from .cache import GeometryCache
 from .convexity import is_convex
+from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
-from .hull import hull_volume
 from .mesh import Mesh
-from .pieces import ConvexPiece, hull_piece, prisms
-from .polygons import Polygon, convex_polygons
+from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
+from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..work import COSTLY, Work
+from ..limits import COSTLY, Work
+from .distance import nearest
 from .topology import Bools, Floats, Ints
-from .triangle_distance import nearest
 from .triangle_tree import Forest
 
 # Pairs of triangles whose exact distance is taken at once: the first ones tighten the bound for the others.

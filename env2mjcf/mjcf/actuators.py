@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..dofs import DofKind
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Part, RobotParts
-from .bodies import Compilation
+from ..kinematics.tree import DofKind
+from .links import Compilation
 from .writer import Element, add, number
 
 # A gain of m g r holds a link at one radian of error; this many times stiffer, at a hundredth.

@@ -13,8 +13,8 @@ from trimesh.exchange.stl import export_stl
 
 from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
-from ..names import file_stem, mesh_stem, unique
-from ..transforms import Array
+from ..kinematics.transforms import Array
+from ..model.names import file_stem, mesh_stem, unique
 from .writer import Element, add, numbers, to_text
 
 ASSET_FOLDER = "assets"

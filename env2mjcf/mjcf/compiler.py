@@ -1,4 +1,7 @@
-"""Compiles an assembled scene into one MJCF document and its assets."""
+"""Compiles an assembled scene into one MJCF document and its assets.
+
+MERGED: Keyframes: the home configuration, and start and goal of the first task.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,20 @@ from importlib.metadata import PackageNotFoundError, version
 
 from lxml import etree
 
-from ..errors import DiagnosticLog
+from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly
-from ..names import file_stem
+from ..kinematics.space import ConfigurationSpace
+from ..model.environment import Task
+from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
-from ..space import ConfigurationSpace
 from .actuators import add_actuators
-from .bodies import Compilation, add_obstacles, add_robot
-from .contacts import add_contacts, excluded_obstacles
-from .keyframes import add_keyframes
+from .checks import report_unused
+from .geoms import add_contacts, excluded_obstacles
+from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
-from .reporting import report_unused
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky
-from .writer import add, comment_text, plain, to_text
+from .writer import Element, add, comment_text, numbers, plain, to_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,3 +101,18 @@ def package_version() -> str:
         return version("env2mjcf")
     except PackageNotFoundError:
         return "unknown"
+
+
+def add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
+    """Append `home`, and `start` and `goal` where there is a task."""
+    keys = {"home": space.home}
+    if tasks and len(tasks[0].configurations):
+        q = space.of_task(tasks[0])
+        keys |= {"start": q[0], "goal": q[-1]}
+    if not space.nq:
+        return
+    keyframe = add(root, "keyframe")
+    for name, q in keys.items():
+        qpos = space.qpos(q)
+        ctrl = [qpos[s.address] for slots in space.slots for s in slots if not s.free]
+        add(keyframe, "key", name=name, qpos=numbers(qpos), ctrl=numbers(ctrl) if actuated and ctrl else None)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..dofs import Dof, DofKind
 from ..geometry.assembly import RobotParts
-from ..layout import joint_kinds
-from ..model import BaseKind
-from ..transforms import inverse
+from ..kinematics.qpos import joint_kinds
+from ..kinematics.transforms import inverse
+from ..kinematics.tree import Dof, DofKind
+from ..model.environment import BaseKind
 from .writer import Element, add, number, numbers, tidy
 
 _BASE_AXES = {

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..dofs import DofKind
-from ..errors import DiagnosticLog, KinematicsError
+from ..diagnostics import DiagnosticLog
+from ..errors import KinematicsError
 from ..geometry.assembly import RobotParts
-from ..model import JointType
-from ..transforms import Array, inverse, quaternion_from_matrix
-from .bodies import Compilation
+from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
+from ..kinematics.tree import DofKind
+from ..model.environment import JointType
+from .links import Compilation
 from .writer import Element, add, numbers, tidy
 
 # A loop counts as closed at home below this fraction of the scene's extent.

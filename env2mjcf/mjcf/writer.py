@@ -10,7 +10,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
-from ..transforms import Array
+from ..kinematics.transforms import Array
 
 Element = Any  # lxml's classes have no public names
 

@@ -10,10 +10,11 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.paths import EdgeSteps
-from ..errors import DiagnosticLog, FormatError
-from ..forking import lasting
-from ..transforms import Array
+from ..contact.edges import EdgeSteps
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError
+from ..kinematics.transforms import Array
+from ..system.locks import lasting
 from .scene import Scene
 from .verdicts import Judge, Verdict
 

@@ -1,91 +1,85 @@
-"""Loads compiled scenes into MuJoCo, and tells its errors in the words of the env file."""
+"""From a file to a loaded scene, with a look at what touches at home."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import NoReturn
+import dataclasses
+from typing import Any
 
-import mujoco
-
-from ..errors import ConversionError, DiagnosticLog, Span
-from ..geometry.assembly import Assembly
-from ..mjcf.compiler import Document
-
-_QUOTED = re.compile(r"'([^']+)'")
-_LINE = re.compile(r"\bline (\d+)")
-_NAME = re.compile(r'\b(?:name|mesh|body1|geom1|joint)="([^"]+)"')
+from ..contact.exact.engine import require
+from ..contact.types import Contact
+from ..diagnostics import DiagnosticLog
+from ..errors import KinematicsError
+from ..model.environment import Dialect
+from ..options import Options, PathArgument
+from ..pipeline import Compiled, compile_scene, recompile
+from .mujoco_model import load_model
+from .scene import Scene
 
 
-def load_model(document: Document, assembly: Assembly, log: DiagnosticLog) -> mujoco.MjModel:
-    """Compile a document in memory.
+def load(path: PathArgument, **options: Any) -> Scene:
+    """Load a scene into MuJoCo; nothing is written.
 
-    Raises:
-        ConversionError: MuJoCo refuses it; the error has the line of the env file that the refusal comes from.
-    """
-    return _compiled(lambda: load_spec(document), document, assembly, log)
-
-
-def load_spec(document: Document) -> mujoco.MjSpec:
-    """Parse a document into a spec that holds its assets, ready to be attached to another one."""
-    with mujoco.MjVfs() as vfs:
-        vfs["model.xml"] = document.xml.encode("utf-8")
-        for name, data in document.assets.items():
-            vfs[name] = data
-        spec = mujoco.MjSpec.from_file("model.xml", vfs=vfs)
-    # Paths of assets are relative to the folder of the model; the dictionary stays with the spec.
-    spec.assets = {Path(n).name: d for n, d in document.assets.items() if not n.endswith(".xml")}
-    return spec
-
-
-def load_file(path: Path, document: Document, assembly: Assembly, log: DiagnosticLog) -> mujoco.MjModel:
-    """Load a written MJCF file, as a user does.
+    Args:
+        path: An env file of any dialect, an XML environment, or the planner's problem XML.
+        **options: Fields of `Options`.
 
     Raises:
-        ConversionError: MuJoCo refuses it.
+        FormatError: A text file cannot be read.
+        GeometryError: A mesh is missing or unusable.
+        KinematicsError: The bodies of a robot do not hang together.
+        ConversionError: MuJoCo cannot express, or refuses, the scene.
+        TypeError: An unknown option.
+        ValueError: A value that an option cannot take.
     """
-    # Loading it without a spec, MuJoCo writes its warnings to a file in the current folder.
-    return _compiled(lambda: mujoco.MjSpec.from_file(str(path)), document, assembly, log)
+    chosen = Options.from_keywords(options)
+    return prepare(path, chosen, DiagnosticLog(chosen.strict))
 
 
-def _compiled(
-    spec: Callable[[], mujoco.MjSpec], document: Document, assembly: Assembly, log: DiagnosticLog
-) -> mujoco.MjModel:
-    try:
-        return spec().compile()
-    except UserWarning as warning:
-        said = " ".join(str(warning).split())
-        log.fail(
-            ConversionError, "MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}",
-            hint="correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)",
+def prepare(path: PathArgument, options: Options, log: DiagnosticLog) -> Scene:
+    """Load a scene with options already checked; see `load`."""
+    if options.engine == "exact":
+        require()
+    compiled = compile_scene(path, options, log)
+    scene = _scene(compiled, log)
+    # One look is not worth compiling the exact engine for.
+    touching = _touching_pairs(scene.contacts(scene.space.home, engine="mujoco")) if scene.link_names else {}
+    if touching and options.exclude_rest_contacts:
+        names = ", ".join(f"{a} and {b}" for a, b in touching)
+        log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {names}")
+        # The first compilation has reported everything else already.
+        return _scene(recompile(compiled, list(touching), DiagnosticLog()), log)
+    for (link, other), contact in touching.items():
+        _report_touching(compiled, link, other, contact, log)
+    return scene.with_diagnostics(tuple(log))
+
+
+def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
+    model = load_model(compiled.document, compiled.assembly, log)
+    return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
+
+
+def _touching_pairs(contacts: list[Contact]) -> dict[tuple[str, str], Contact]:
+    """Return the deepest contact of each pair."""
+    deepest: dict[tuple[str, str], Contact] = {}
+    for contact in contacts:
+        key = (contact.link, contact.other)
+        if key not in deepest or contact.distance < deepest[key].distance:
+            deepest[key] = contact
+    return deepest
+
+
+def _report_touching(compiled: Compiled, link: str, other: str, contact: Contact, log: DiagnosticLog) -> None:
+    body = next(p.body for p in compiled.assembly.parts() if p.name == link)
+    if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
+        # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
+        log.info(
+            "KIN312", link, f"{link} and {other} touch at home, where the base is at the origin",
+            hint="" if compiled.environment.tasks else "give a query: simulations can begin at its start",
+            span=body.span,
         )  # fmt: skip
-    except ValueError as error:
-        _refuse(" ".join(str(error).split()), document, assembly, log)
-
-
-def _refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> NoReturn:
-    """Raise MuJoCo's refusal as a `ConversionError` about the body that it concerns."""
-    subject, span = _culprit(message, document, assembly)
-    log.fail(
-        ConversionError, "MJC401", subject or document.name,
-        f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {message}",
-        hint="" if span else "this may be a fault of env2mjcf: please report it with the scene", span=span,
+        return
+    log.warn(
+        KinematicsError, "KIN312", link, f"{link} and {other} touch at home",
+        hint="exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch",
+        span=body.span,
     )  # fmt: skip
-
-
-def _culprit(message: str, document: Document, assembly: Assembly) -> tuple[str, Span | None]:
-    """Find the body that a message is about: by a name it quotes, else by the line of the MJCF that it gives."""
-    spans: dict[str, Span | None] = {p.name: p.body.span for p in assembly.parts()}
-    by_mesh = {p.mesh.name: p.body.span for p in assembly.parts()}
-    candidates = _QUOTED.findall(message)
-    line = _LINE.search(message)
-    if line and int(line.group(1)) <= document.xml.count("\n"):
-        candidates += _NAME.findall(document.xml.splitlines()[int(line.group(1)) - 1])
-    for candidate in candidates:
-        for name in (candidate, candidate.rpartition(":")[0], candidate.rpartition(".")[0]):
-            if name in spans:
-                return name, spans[name]
-            if name in by_mesh:
-                return name, by_mesh[name]
-    return "", None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..contact.boundary import BoundaryTest
 from ..contact.types import Contact
-from ..transforms import Array
+from ..kinematics.transforms import Array
+from ..options import Engine
 from .scene import Scene
 
 
@@ -143,3 +145,67 @@ def _deepest(contacts: Sequence[Contact]) -> tuple[Contact, ...]:
         if pair not in deepest or contact.distance < deepest[pair].distance:
             deepest[pair] = contact
     return tuple(deepest.values())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judgement:
+    """What is known of the configuration that is shown.
+
+    Attributes:
+        collides: Whether anything touches.
+        contacts: All contacts, the deepest first; None while they are being looked for.
+        beyond: Columns of the degrees of freedom beyond their limits.
+        outside: Names of the links that reach beyond the boundary.
+    """
+
+    collides: bool
+    contacts: tuple[Contact, ...] | None
+    beyond: tuple[int, ...]
+    outside: tuple[str, ...]
+
+    @property
+    def valid(self) -> bool:
+        """Whether nothing is wrong."""
+        return not (self.collides or self.beyond or self.outside)
+
+
+class LiveJudge:
+    """Judges one configuration at a time.
+
+    MuJoCo's engine answers, unless another one was asked for by name: the exact engine of `auto` may have to be
+    compiled for a minute, and gains nothing on single verdicts.
+
+    Args:
+        scene: The scene.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        chosen = scene.compiled.options.engine
+        self._engine: Engine = "mujoco" if chosen == "auto" else chosen
+        self._scene = scene
+        boundary = scene.compiled.assembly.environment.boundary
+        links = [p for r in scene.compiled.assembly.robots for p in r.links]
+        self._boundaries = [(p.name, BoundaryTest(boundary, [p])) for p in links] if boundary else []
+
+    def verdict(self, q: Array) -> Judgement:
+        """Return what a verdict tells of q, (dim,): everything but the contacts, unless there are none."""
+        collides = bool(self._scene.in_collision(q, engine=self._engine))
+        beyond = tuple(int(i) for i in np.flatnonzero(self._scene.space.broken(q)))
+        return Judgement(collides, None if collides else (), beyond, self._outside(q))
+
+    def judge(self, q: Array) -> Judgement:
+        """Return all that is known of q, (dim,)."""
+        judgement = self.verdict(q)
+        if judgement.contacts is not None:
+            return judgement
+        return dataclasses.replace(judgement, contacts=tuple(self._scene.contacts(q, engine=self._engine)))
+
+    def valid(self, q: Array) -> bool:
+        """Return whether q, (dim,), is valid."""
+        return bool(self._scene.is_valid(q, engine=self._engine))
+
+    def _outside(self, q: Array) -> tuple[str, ...]:
+        if not self._boundaries:
+            return ()
+        poses = self._scene.link_poses(q[None])
+        return tuple(name for i, (name, test) in enumerate(self._boundaries) if not test.inside(poses[:, i : i + 1])[0])

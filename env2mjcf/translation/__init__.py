@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .files import Written as Written
-from .files import write_environment as write_environment
-from .tasks import DofMap as DofMap
+from .outputs import Written as Written
+from .outputs import write_environment as write_environment
+from .scene_parts import DofMap as DofMap
 from .translating import Translation as Translation
 from .translating import translate as translate

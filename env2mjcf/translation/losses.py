@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from ..dialects import RULES, VOCABULARIES, DialectRules, Vocabulary
-from ..errors import ConversionError, DiagnosticLog, Span
-from ..model import Dialect
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError, Span
+from ..model.dialects import RULES, VOCABULARIES, DialectRules, Vocabulary
+from ..model.environment import Dialect
 
 
 class Losses:

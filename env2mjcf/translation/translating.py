@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
-from ..errors import Diagnostic, DiagnosticLog
-from ..model import Boundary, Dialect, Environment, MultiBody, PlannerRules
-from . import boundary as bounds
-from . import multibodies
+from ..diagnostics import DiagnosticLog
+from ..errors import Diagnostic
+from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules
+from . import scene_parts as bounds
 from .losses import Losses
-from .tasks import DofMap
+from .robots import translate_obstacles, translate_robot
+from .scene_parts import DofMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ class _Robots:
         meets = bool(environment.obstacles)
         files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
         self.translated = tuple(
-            replace(multibodies.robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
+            replace(translate_robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
         )
         self.maps = tuple(DofMap.of(a, b) for a, b in zip(sources, self.translated, strict=True))
         self._by_id = {id(s): t for s, t in zip(sources, self.translated, strict=True)}
@@ -110,7 +111,7 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
         if robot is not None:
             found.append(robot)
         elif source.kind in losses.vocabulary.kinds:
-            found += multibodies.obstacles(source, losses)
+            found += translate_obstacles(source, losses)
         else:
             found += _surface(source, losses)
     if losses.vocabulary.robot_files:
@@ -132,7 +133,7 @@ def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
         "ENV174", name, f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an "
         "obstacle", "", source.span,
     )  # fmt: skip
-    return list(multibodies.obstacles(source, losses))
+    return list(translate_obstacles(source, losses))
 
 
 def _report_number(environment: Environment, losses: Losses) -> None:

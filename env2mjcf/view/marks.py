@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import positive
+from ..options import positive
 
 Color = tuple[float, float, float, float]
 

@@ -15,12 +15,12 @@ from typing import IO, Any
 import mujoco
 import numpy as np
 
-from ..arguments import whole
-from ..dofs import DofKind
 from ..geometry.assembly import Part
-from ..mjcf.boundary import boundary_lines
+from ..kinematics.transforms import Array
+from ..kinematics.tree import DofKind
+from ..mjcf.scenery import boundary_lines
+from ..options import whole
 from ..simulation.scene import Scene
-from ..transforms import Array
 from .framing import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
 from .offscreen import RenderError, drawn

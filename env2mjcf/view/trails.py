@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..geometry.assembly import RobotParts
+from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
-from ..transforms import Array
 
 # An edge is cut so finely to be measured, and drawn.
 _PARTS_OF_AN_EDGE = 16

@@ -8,11 +8,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from ...dofs import DofKind
 from ...geometry.topology import Floats, Ints
-from ...kinematics import RobotKinematics
-from ...model import BaseKind, DHForm
-from ...transforms import dh_matrix, pose_matrix
+from ...kinematics.forward import RobotKinematics
+from ...kinematics.transforms import dh_matrix, pose_matrix
+from ...kinematics.tree import DofKind
+from ...model.environment import BaseKind, DHForm
 
 WORLD = -1
 """The parent of a step that begins at the origin; the column of a number that is zero."""

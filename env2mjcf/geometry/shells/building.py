@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...work import Work
+from ...limits import Work
 from ..analysis import Analysis
+from ..coplanar import Polygon, convex_polygons
 from ..pieces import SLENDEREST, ConvexPiece, prisms, too_narrow
-from ..polygons import Polygon, convex_polygons
 from ..topology import Ints
-from .corners import cell_corners
-from .doubts import doubtful_polygons
-from .pairing import pair_sides
+from .cells import Group, cell_corners, groups
+from .fitting import Surroundings, fit
+from .pairing import doubtful_polygons, pair_sides
 from .splitting import split_thin
-from .thickness import Surroundings, fit
-from .walls import Group, groups
 
 THICKEST = 0.02
 """Greatest height of a cell in units of the mesh's diagonal: thicker ones cost time and gain nothing."""

@@ -1,0 +1,186 @@
+"""What ends the program `env2mjcf`, and how, from its first import on; a library leaves all of that alone.
+
+Ctrl-C, SIGTERM and SIGHUP: while numpy is imported they may become an error of another kind, or a traceback; so they
+end the program at once, which has done nothing yet, until there is something that may have to be tidied up.
+
+
+MERGED: The standard streams of the program, so that none of them can change its exit status for another reason than its own.
+
+One that is closed leads nowhere. What cannot be written to stderr is left out: the results and the status say enough.
+What cannot be written to stdout is an error of its own.
+
+
+MERGED: The exit statuses of the program.
+
+MERGED: What is said of an error that nobody expected.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import signal
+import sys
+import threading
+import traceback
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+interrupted = 0
+"""The signal that was to end the program: what goes wrong afterwards may go wrong because of it."""
+
+_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_ours: tuple[signal.Signals, ...] = ()
+_swallowed = False
+# Seconds; by then the callback has returned.
+_SOON = 0.05
+
+
+def is_program() -> bool:
+    """Return whether Python was started to run the program; with -m, that is known while it is imported only."""
+    first, words = (sys.argv or [""])[0], sys.orig_argv
+    if first == "-m":
+        return "-m" in words and words[words.index("-m") + 1 :][:1] == ["env2mjcf"]
+    return os.path.basename(first) in ("env2mjcf", "env2mjcf.exe")
+
+
+def begin() -> None:
+    """Take this process over, before anything is imported that may fail."""
+    global _ours  # noqa: PLW0603  a process has one handler
+    take_over()
+    sys.excepthook = _end
+    # What is ignored, as nohup has it, stays ignored.
+    _ours = tuple(s for s in _SIGNALS if signal.getsignal(s) in (signal.default_int_handler, signal.SIG_DFL))
+    end_at_once()
+
+
+def end_at_once() -> None:
+    """Let signals end the process without a word."""
+    for number in _ours:
+        signal.signal(number, signal.SIG_DFL)
+
+
+def end_tidily() -> None:
+    """Let signals raise a KeyboardInterrupt."""
+    for number in _ours:
+        signal.signal(number, _interrupt)
+    if _ours:
+        sys.unraisablehook = _unraisable
+
+
+def interrupted_status() -> int:
+    """Return the exit status of a program that was interrupted."""
+    return of_signal(interrupted or signal.SIGINT)
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    global interrupted, _swallowed
+    if number == interrupted != signal.SIGINT and not _swallowed:
+        return  # a terminal that is closed sends SIGHUP, and so does its shell: that must not end the tidying up
+    interrupted, _swallowed = interrupted or number, False
+    raise KeyboardInterrupt
+
+
+def _unraisable(found: sys.UnraisableHookArgs) -> None:
+    """Interrupt once more where a library's callback, such as one of numba's compiler, has swallowed it."""
+    global _swallowed  # noqa: PLW0603  a process is interrupted once
+    if issubclass(found.exc_type, KeyboardInterrupt):
+        _swallowed = True
+        threading.Timer(_SOON, _press_again).start()
+    else:
+        sys.__unraisablehook__(found)
+
+
+def _press_again() -> None:
+    number = interrupted or signal.SIGINT
+    if hasattr(signal, "pthread_kill"):
+        # To the thread that is to be woken.
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
+
+
+def _end(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """End the process with the status of a fault: Python's own is that of a finding."""
+    try:
+        if "--debug" in sys.argv or os.environ.get("ENV2MJCF_DEBUG") == "1":
+            sys.__excepthook__(kind, error, trace)
+        sys.stderr.write(f"env2mjcf: {describe(error)}\n")
+        sys.stderr.flush()
+    finally:
+        os._exit(FAULT)
+
+
+class ResultsError(OSError):
+    """Results that cannot be written to stdout."""
+
+
+class _Results(io.FileIO):
+    def write(self, data: ReadableBuffer, /) -> int | None:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            raise  # whoever reads has seen enough
+        except OSError as error:
+            raise ResultsError(error.errno, error.strerror) from error
+
+
+class _Remarks(io.FileIO):
+    def write(self, data: ReadableBuffer, /) -> int | None:
+        try:
+            return super().write(data)
+        except OSError:
+            return memoryview(data).nbytes
+
+
+def take_over() -> None:
+    """Replace the standard streams of this process."""
+    # Otherwise the next file that is opened takes a closed one's number, and what libraries print goes into it.
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(handle, True)
+    os.close(handle)
+    if os.name == "posix":  # consoles of Windows are no files
+        sys.stdout = _over(_Results(1, "w", closefd=False), sys.stdout)
+        sys.stderr = _over(_Remarks(2, "w", closefd=False), sys.stderr)
+
+
+def _over(raw: io.FileIO, before: TextIO | None) -> TextIO:
+    """Return a stream that encodes as the one before did, and keeps no line back that it did not."""
+    if not isinstance(before, io.TextIOWrapper):
+        return io.TextIOWrapper(io.BufferedWriter(raw), "utf-8")
+    at_once = before.line_buffering or before.write_through
+    return io.TextIOWrapper(io.BufferedWriter(raw), before.encoding, before.errors, line_buffering=at_once)
+
+
+DONE = 0
+"""Done, free or valid."""
+FINDING = 1
+"""A collision, an invalid configuration, an error that lint found; never a failure."""
+WRONG_USAGE = 2
+BAD_INPUT = 3
+"""Something cannot be read, or what was asked for cannot be written."""
+FAULT = 4
+"""A fault of env2mjcf, or too little memory, or too many open files."""
+BROKEN_PIPE = 141
+"""What shells report for a program that is stopped by SIGPIPE."""
+
+
+def of_signal(number: int) -> int:
+    """Return what shells report for a program that is stopped by a signal."""
+    return 128 + number
+
+
+def describe(error: BaseException) -> str:
+    """Return a sentence: what the machine lacks, else that env2mjcf is at fault."""
+    number = error.errno if isinstance(error, OSError) else None
+    # What is imported says it of a library in words only.
+    if isinstance(error, MemoryError) or number == errno.ENOMEM or os.strerror(errno.ENOMEM) in str(error):
+        return "there is not enough memory"
+    if number in (errno.EMFILE, errno.ENFILE):
+        return f"{os.strerror(number)}: ask for more of them (ulimit -n)"
+    said = "".join(traceback.format_exception_only(error)).strip().replace("\n", "; ")
+    return f"a fault of env2mjcf, please report it: {said} (--debug shows where)"

@@ -1,0 +1,168 @@
+"""Queries of a scene: starts, goals, and what is between.
+
+MERGED: Between a file's own numbers and configurations of a scene; and onto the disk.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError, Span
+from ..formats import rows as text
+from ..formats.path import ALL_ROBOTS
+from ..formats.source import read_source
+from ..kinematics.space import ConfigurationSpace
+from ..kinematics.transforms import Array
+from ..limits import LARGEST, Limits
+from ..model.dialects import begins_with_robot
+from ..model.environment import Dialect, Task
+from ..options import PathArgument
+from ..simulation.scene import Query, Scene
+from ..system.files import output
+
+
+def read_query(
+    scene: Scene, file: PathArgument, *, limits: Limits | None = None, strict: bool = False
+) -> tuple[Query, ...]:
+    """Read a query file for a scene.
+
+    Args:
+        scene: Whose configurations they are.
+        file: A query file of any dialect.
+        limits: Bounds on hostile input.
+        strict: Whether warnings are errors.
+
+    Returns:
+        One query for each robot that has configurations, the other robots at home.
+
+    Raises:
+        FormatError: The file cannot be read, or a row fits no robot.
+    """
+    log = DiagnosticLog(strict)
+    tasks = text.read_query(read_source(file, log, limits or Limits()), dofs_of(scene), log)
+    return tuple(Query(t.robot, scene.space.of_task(t), t.label) for t in tasks)
+
+
+def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgument) -> Path:
+    """Write a query file, each query's own robot only, in the dialect of the scene, whole or not at all.
+
+    Args:
+        scene: Whose configurations they are.
+        queries: What is to be visited.
+        file: The file to write; replaced if it exists.
+
+    Raises:
+        ConversionError: The file cannot be written.
+        ValueError: A query has a wrong shape, a value that is not finite, or a robot that does not exist; or there is
+            no configuration.
+    """
+    listed = [queries] if isinstance(queries, Query) else list(queries)
+    if not any(len(q.q) for q in listed):
+        raise ValueError("queries hold no configuration; expected a start and a goal")
+    tasks = [Task(q.robot, tuple(map(tuple, file_numbers(scene, q.q, q.robot)))) for q in listed]
+    return write(file, text.query_text(tasks, index=written_index(scene, 0) is not None))
+
+
+def dofs_of(scene: Scene) -> list[int]:
+    """Return the number of degrees of freedom of each robot."""
+    return [s.stop - s.start for s in scene.space.robot_slices]
+
+
+def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) -> Array:
+    """Return rows (robot, its numbers in the file) as (n, dim), the other robots at home."""
+    space = scene.space
+    q = np.tile(space.home, (len(rows), 1))
+    for robot in {r for r, _ in rows}:
+        columns = slice(0, space.dim) if robot == ALL_ROBOTS else space.robot_slices[robot]
+        own = [i for i, (r, _) in enumerate(rows) if r == robot]
+        numbers = np.zeros((len(own), space.dim))
+        numbers[:, columns] = [rows[i][1] for i in own]
+        q[own, columns] = space.decode(numbers)[:, columns]
+    return q
+
+
+def out_of_turns(
+    scene: Scene, rows: Sequence[tuple[int, Sequence[float]]], file: str, span: Span, log: DiagnosticLog
+) -> list[tuple[int, Sequence[float]]]:
+    """Return rows of dialect A's time, whose angles are turns, in the units of the scene's dialect.
+
+    Args:
+        scene: Whose configurations they are.
+        rows: Rows (robot, its numbers in the file).
+        file: Name of the file.
+        span: Where it tells its age.
+        log: Where findings go.
+    """
+    if scene.environment.dialect is Dialect.A or not rows:
+        return list(rows)
+    log.warn(
+        FormatError, "CFG535", file,
+        "a file of this version counts angles in turns, the scene's dialect in fractions of pi; read as turns",
+        hint="is it the file of an older version of the scene?", span=span,
+    )  # fmt: skip
+    robots = scene.compiled.assembly.robots
+    factors = {i: [1.0 if d.kind.is_length else 2.0 for d in r.kinematics.dofs] for i, r in enumerate(robots)}
+    factors[ALL_ROBOTS] = [f for i in range(len(robots)) for f in factors[i]]
+    return [(r, [x * f for x, f in zip(row, factors[r], strict=True)]) for r, row in rows]
+
+
+def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
+    """Return one robot's numbers of configurations (n, dim) as they are written.
+
+    Decoding them gives q again to the last bit wherever some number does; else it is one unit of the last digit off,
+    because not every double is a multiple of pi.
+
+    Raises:
+        ValueError: q has a wrong shape, a value that is not finite or too large, or there is no such robot.
+    """
+    space = scene.space
+    columns = columns_of(scene, robot)
+    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, columns]
+    if (np.abs(numbers) > LARGEST).any():
+        raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
+    return numbers.tolist()
+
+
+def columns_of(scene: Scene, robot: int) -> slice:
+    """Return the columns of a robot.
+
+    Raises:
+        ValueError: There is no such robot.
+    """
+    count = len(scene.space.robot_slices)
+    if not 0 <= robot < count:
+        raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
+    return scene.space.robot_slices[robot]
+
+
+def written_index(scene: Scene, robot: int) -> int | None:
+    """Return the index that a robot's configurations begin with; None where the dialect writes none."""
+    return robot if begins_with_robot(scene.environment) else None
+
+
+def write(file: PathArgument, text: str) -> Path:
+    """Write a text, whole or not at all.
+
+    Raises:
+        ConversionError: It cannot be written.
+    """
+    path = Path(os.fspath(file))
+    with output(path, "CFG532") as beside:
+        beside.write_bytes(text.encode("utf-8"))
+    return path
+
+
+def _exactly(space: ConfigurationSpace, q: Array) -> Array:
+    numbers = space.encode(q)
+    best = numbers.copy()
+    wrong = space.decode(best) != q
+    for neighbour in (np.nextafter(numbers, -np.inf), np.nextafter(numbers, np.inf)):
+        better = wrong & (space.decode(neighbour) == q)
+        best[better] = neighbour[better]
+    return best

@@ -1,0 +1,260 @@
+"""Edges and paths: configurations close enough together that nothing is passed over.
+
+MERGED: How far bodies can move, and how much nearer they can come to each other, on straight ways.
+
+MERGED: Proof that an edge is free: distances along it, each of which clears a stretch of the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..geometry.assembly import Assembly
+from ..kinematics.space import ConfigurationSpace
+from ..kinematics.transforms import Array
+from ..kinematics.tree import Dof, DofKind
+from ..pairs import Pair
+from .types import Contact, PathReport
+
+# Without a resolution in the file, a step is this fraction of the extent.
+_DEFAULT_RESOLUTION = 0.01
+_MOST_STEPS = 1e15
+# Of one edge, whose configurations are made at once.
+_MOST_ROWS = 10_000_000
+
+
+class EdgeSteps:
+    """Cuts straight edges so that no point of a robot moves further than the resolution between two checks.
+
+    Args:
+        assembly: The scene.
+        space: Its configuration space.
+    """
+
+    def __init__(self, assembly: Assembly, space: ConfigurationSpace) -> None:
+        self._assembly = assembly
+        self._space = space
+        self._motion = MotionBounds(assembly, space)
+
+    @property
+    def usual(self) -> float:
+        """The step in metres where nothing is asked for, and the file has none: 0.01 extent."""
+        return _DEFAULT_RESOLUTION * self._assembly.extent
+
+    def resolution(self, resolution: float | None) -> float:
+        """Return the step in metres: what was asked for, else the file's PositionRes, else 0.01 extent.
+
+        Raises:
+            ValueError: The resolution is not a positive number.
+        """
+        if resolution is None:
+            of_file = self._assembly.environment.resolution.position
+            return of_file if of_file else self.usual
+        if not 0 < resolution < float("inf"):
+            raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
+        return resolution
+
+    def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
+        """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""
+        moved = self._motion.links(start, delta).max(axis=1, initial=0.0)
+        # What fits into no integer would come out negative, and pass for a short way.
+        with np.errstate(over="ignore"):
+            steps = np.minimum(np.ceil(moved / self.resolution(resolution)), _MOST_STEPS)
+        return np.maximum(2, steps.astype(np.int64) + 1)
+
+    def bounded_counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
+        """Return `counts` of edges that can be checked.
+
+        Raises:
+            ValueError: An edge has more than ten million configurations.
+        """
+        counts = self.counts(start, delta, resolution)
+        most = int(counts.max(initial=0))
+        if most > _MOST_ROWS:
+            step = self.resolution(resolution)
+            raise ValueError(
+                f"resolution is {step:g}; in such steps an edge has {most:g} configurations, more than {_MOST_ROWS:g}"
+            )
+        return counts
+
+    def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:
+        """Return the configurations to be checked on an edge, both ends included, (n, dim)."""
+        start, delta = self._space.check(q0), self._space.difference(q0, q1)
+        count = int(self.bounded_counts(start[None], delta[None], resolution)[0])
+        return start + np.linspace(0.0, 1.0, count)[:, None] * delta
+
+
+def check_path(
+    path: ArrayLike,
+    steps: EdgeSteps,
+    is_valid: Callable[[Array], NDArray[np.bool_]],
+    contacts: Callable[[Array], list[Contact]],
+    space: ConfigurationSpace,
+    resolution: float | None,
+) -> PathReport:
+    """Check the configurations of a path and the straight edges between them.
+
+    Raises:
+        ValueError: The path is no (k, dim) array of finite numbers.
+    """
+    rows = space.check(path)
+    if rows.ndim != 2:
+        raise ValueError(f"a path of shape {rows.shape}; expected (k, {space.dim})")
+    good = is_valid(rows)
+    edges = np.ones(max(0, len(rows) - 1), dtype=bool)
+    first: tuple[int, Array] | None = None
+    for i, row in enumerate(rows):
+        if not good[i]:
+            first = first or (i, row)
+        if i + 1 == len(rows):
+            break
+        between = steps.rows(row, rows[i + 1], resolution)
+        valid = is_valid(between)
+        edges[i] = bool(valid.all())
+        if not edges[i] and first is None:
+            first = (i, between[int(np.argmin(valid))])
+    index, q = first if first else (None, None)
+    touching = tuple(contacts(q)) if q is not None else ()
+    return PathReport(first is None, good, edges, index, q, touching)
+
+
+_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
+
+
+class MotionBounds:
+    """Bounds of motion from distances along the chains of links.
+
+    Args:
+        assembly: The scene.
+        space: Its configuration space.
+        pairs: Pairs of links whose approach is asked for.
+    """
+
+    def __init__(self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair] = ()) -> None:
+        self._robots = assembly.robots
+        self._slices = space.robot_slices
+        names = [n for r in assembly.robots for n in r.names]
+        self._shape = (space.dim, len(names))
+        first = [names.index(p.link) for p in pairs]
+        second = [names.index(p.other) for p in pairs]
+        self._first, self._second = np.array(first, dtype=np.int64), np.array(second, dtype=np.int64)
+        dofs = [d for r in assembly.robots for d in r.kinematics.dofs]
+        self._slides = np.array([d.kind is DofKind.D for d in dofs], dtype=np.bool_)
+        self._bases = [
+            (columns.start + np.array([i for i, d in enumerate(r.kinematics.dofs) if d.body == body and _of_base(d)]))
+            for r, columns in zip(assembly.robots, space.robot_slices, strict=True)
+            for body in sorted(r.kinematics.tree.bases)
+        ]
+        self._kinds = [d.kind for d in dofs]
+        self._fixed = None if self._slides.any() else self._levers(np.zeros(space.dim))
+
+    def links(self, start: Array, delta: Array) -> Array:
+        """Bound how far any point of each link moves, (n, nlinks), on the ways from (n, dim) by (n, dim)."""
+        return self._bound(start, delta, lambda levers: levers)
+
+    def split(self, start: Array, delta: Array) -> tuple[Array, Array]:
+        """Part the motion of links on ways from (n, dim) by (n, dim) in two.
+
+        Returns:
+            The straight translation of each link's base in the world, (n, nlinks, 3); and bounds of how far any point
+            of each link moves besides, (n, nlinks).
+        """
+        drifts = np.zeros((len(start), self._shape[1], 3))
+        rest, link = delta.copy(), 0
+        for robot, columns in zip(self._robots, self._slices, strict=True):
+            # Links of robots with several bases have no translation in common.
+            if len(robot.kinematics.tree.bases) == 1:
+                for i, kind in enumerate(self._kinds[columns]):
+                    if kind in _TRANSLATIONS and robot.kinematics.dofs[i].connection is None:
+                        moved = delta[:, columns.start + i]
+                        drifts[:, link : link + len(robot.links), _TRANSLATIONS.index(kind)] = moved[:, None]
+                        rest[:, columns.start + i] = 0.0
+            link += len(robot.links)
+        return drifts, self.links(start, rest)
+
+    def pairs(self, start: Array, delta: Array) -> Array:
+        """Bound how much nearer the links of each pair can come to each other, (n, npairs).
+
+        What moves both of them as one does not count.
+        """
+        return self._bound(start, delta, self._between)
+
+    def _bound(self, start: Array, delta: Array, chosen: Callable[[Array], Array]) -> Array:
+        turns = self._turns(delta)
+        if self._fixed is not None:
+            return turns @ chosen(self._fixed)
+        # How far a slide reaches out depends on the way.
+        farthest = np.maximum(np.abs(start), np.abs(start + delta))
+        out = np.empty((len(start), chosen(np.zeros(self._shape)).shape[1]))
+        for i, (turn, far) in enumerate(zip(turns, farthest, strict=True)):
+            out[i] = turn @ chosen(self._levers(far))
+        return out
+
+    def _between(self, levers: Array) -> Array:
+        first, second = levers[:, self._first], levers[:, self._second]
+        return np.where((first > 0) & (second > 0), 0.0, first + second)
+
+    def _levers(self, slide: Array) -> Array:
+        levers = np.zeros(self._shape)
+        link = 0
+        for robot, columns in zip(self._robots, self._slices, strict=True):
+            of_robot = robot.kinematics.levers([p.radius for p in robot.links], list(slide[columns]))
+            levers[columns, link : link + len(robot.links)] = of_robot
+            link += len(robot.links)
+        return levers
+
+    def _turns(self, delta: Array) -> Array:
+        """Return how far each degree of freedom goes, (n, dim), those of a base taken together.
+
+        The translations of a base make one straight line. Its angular velocity is at most the root of
+        (|rx'| + |rz'|)^2 + ry'^2, since the axis of ry is square to the two others (env-format section 9.2).
+        """
+        turns = np.abs(delta)
+        for columns in self._bases:
+            by_kind = {self._kinds[c]: c for c in columns}
+            along = [by_kind[k] for k in _TRANSLATIONS if k in by_kind]
+            about = [by_kind[k] for k in _ROTATIONS if k in by_kind]
+            if along:
+                turns[:, along[0]], turns[:, along[1:]] = np.linalg.norm(turns[:, along], axis=1), 0.0
+            if len(about) == 3:
+                x, y, z = about
+                turns[:, x], turns[:, about[1:]] = np.hypot(turns[:, x] + turns[:, z], turns[:, y]), 0.0
+        return turns
+
+
+def _of_base(dof: Dof) -> bool:
+    return dof.connection is None
+
+
+def certified(clearance: Callable[[Array], Array], start: Array, delta: Array, motion: float, band: float) -> bool:
+    """Return whether bodies provably stay apart on the straight way from `start` to `start + delta`.
+
+    Where bodies are d apart, they cannot meet before they have come d nearer (conservative advancement: Mirtich,
+    Impulse-based Dynamic Simulation of Rigid Body Systems, 1996). So each distance clears a stretch on both sides of
+    where it was taken; what it leaves is halved, and looked at again.
+
+    Args:
+        clearance: Least distances of rows, (n, dim) to (n,).
+        start: Where the way begins, (dim,).
+        delta: Where it leads from there, (dim,).
+        motion: Bound of how much nearer any two bodies can come on the whole way.
+        band: Where bodies are as near as this, nothing is proved.
+    """
+    # Both ends first: most edges that hit, hit there. Then stretches of the way from 0 to 1, as middle and half length.
+    ends = clearance(np.stack([start, start + delta]))
+    if (ends <= band).any():
+        return False
+    middle, half = np.array([0.5]), np.array([0.5])
+    while len(middle):
+        distance = clearance(start + middle[:, None] * delta)
+        if (distance <= band).any():
+            return False
+        open_ = half * motion >= distance
+        # Halves of what was not cleared; their sum is the stretch again.
+        middle = np.concatenate([middle[open_] - half[open_] / 2, middle[open_] + half[open_] / 2])
+        half = np.tile(half[open_] / 2, 2)
+    return True

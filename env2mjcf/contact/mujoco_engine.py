@@ -1,0 +1,149 @@
+"""MuJoCo's own collision detection as an engine of verdicts and contacts.
+
+MERGED: Pairs that cannot move against each other: decided once, and added to every answer.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kinematics.transforms import Array
+from ..pairs import Pair
+from .types import Contact
+
+
+class MujocoEngine:
+    """Asks `mj_collision` about configurations.
+
+    The engine has a model of its own, in which only links and obstacles collide: ground and walls act in simulation
+    alone. It also sees the explicit pairs of bodies that cannot move, which are decided elsewhere.
+
+    Args:
+        model: The scene's model.
+        owners: Name of the body that each collision geom belongs to.
+    """
+
+    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str]) -> None:
+        names = list(dict.fromkeys(owners.values()))
+        index = {n: i for i, n in enumerate(names)}
+        self._names = names
+        self._owner = np.full(model.ngeom, -1, dtype=np.int64)
+        for geom, owner in owners.items():
+            self._owner[model.geom(geom).id] = index[owner]
+        self._model = copy.copy(model)
+        self._model.geom_contype[self._owner < 0] = 0
+        self._model.geom_conaffinity[self._owner < 0] = 0
+        # One contact is enough for a verdict, and for where two cells touch. MuJoCo's native algorithm misses some deep
+        # overlaps of aligned boxes (coplanar plates that cross), libccd's does not.
+        for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
+            self._model.opt.disableflags |= int(flag)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The model that is asked: an engine made of it answers alike."""
+        return self._model
+
+    def data(self) -> mujoco.MjData:
+        """Return scratch data for one thread."""
+        return mujoco.MjData(self._model)
+
+    def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
+        """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
+        model, kinematics, collision = self._model, mujoco.mj_kinematics, mujoco.mj_collision
+        hits = np.zeros(len(qpos), dtype=bool)
+        for i, row in enumerate(qpos):
+            data.qpos[:] = row
+            kinematics(model, data)
+            collision(model, data)
+            hits[i] = data.ncon > 0
+        return hits
+
+    def touching(self, qpos: Array, data: mujoco.MjData) -> Iterable[tuple[str, str, Array, Array, float]]:
+        """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        if not data.ncon:
+            return []
+        # Iterating data.contact costs more than the query itself.
+        contacts = data.contact
+        geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos.copy()
+        distances = contacts.dist.copy()
+        return [
+            (self._names[self._owner[a]], self._names[self._owner[b]], places[i], frames[i, :3], float(distances[i]))
+            for i, (a, b) in enumerate(geoms)
+        ]
+
+    def body_poses(self, qpos: Array, bodies: NDArray[np.int64], data: mujoco.MjData) -> Array:
+        """Return world poses (n, nbodies, 4, 4) out of MuJoCo's kinematics for qpos of shape (n, nq)."""
+        poses = np.zeros((len(qpos), len(bodies), 4, 4))
+        poses[..., 3, 3] = 1.0
+        for i, row in enumerate(qpos):
+            data.qpos[:] = row
+            mujoco.mj_kinematics(self._model, data)
+            poses[i, :, :3, :3] = data.xmat[bodies].reshape(-1, 3, 3)
+            poses[i, :, :3, 3] = data.xpos[bodies]
+        return poses
+
+
+def static_contacts(
+    model: mujoco.MjModel, data: mujoco.MjData, pairs: tuple[Pair, ...], owners: Mapping[str, str]
+) -> tuple[Contact, ...]:
+    """Return the contacts of all constant pairs, the deepest of each.
+
+    Args:
+        model: The scene's model.
+        data: Its data, with kinematics at any configuration.
+        pairs: The tested pairs.
+        owners: Name of the body that each collision geom belongs to.
+    """
+    geoms: dict[str, list[int]] = {}
+    for geom, owner in owners.items():
+        geoms.setdefault(owner, []).append(int(model.geom(geom).id))
+    found: list[Contact] = []
+    for pair in pairs:
+        if pair.constant:
+            contact = _deepest(model, data, pair, geoms.get(pair.link, []), geoms.get(pair.other, []))
+            if contact is not None:
+                found.append(contact)
+    return tuple(found)
+
+
+def _deepest(
+    model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, mine: list[int], others: list[int]
+) -> Contact | None:
+    best: Contact | None = None
+    if not mine or not others:
+        return None
+    second = np.array(others)
+    centers, radii = data.geom_xpos[second], model.geom_rbound[second]
+    for a in mine:
+        gaps = np.linalg.norm(centers - data.geom_xpos[a], axis=1) - radii - model.geom_rbound[a]
+        for b in second[gaps <= 0]:
+            contact = _touch(model, data, pair, a, int(b))
+            if contact is not None and (best is None or contact.distance < best.distance):
+                best = contact
+    return best
+
+
+def _touch(model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, a: int, b: int) -> Contact | None:
+    ends = np.zeros(6)
+    distance = mujoco.mj_geomDistance(model, data, a, b, 0.0, ends)
+    if distance > 0 or not np.any(ends):
+        return None
+    start, end = ends[:3], ends[3:]
+    return Contact(pair.link, pair.other, pair.kind, (start + end) / 2, _unit(start - end, data, a, b), distance)
+
+
+def _unit(vector: NDArray[np.float64], data: mujoco.MjData, a: int, b: int) -> NDArray[np.float64]:
+    """Return a unit vector; of the line between the geoms' centres where the bodies merely touch."""
+    length = float(np.linalg.norm(vector))
+    if length < 1e-12:
+        vector = data.geom_xpos[b] - data.geom_xpos[a]
+        length = float(np.linalg.norm(vector))
+    return vector / length if length else np.array([0.0, 0.0, 1.0])

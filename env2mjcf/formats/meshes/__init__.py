@@ -1,0 +1,1 @@
+"""Mesh files: BYU, OBJ and others, as arrays."""

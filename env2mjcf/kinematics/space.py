@@ -1,0 +1,246 @@
+"""The configuration space of a scene: the planner's numbers, all robots one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..model.dialects import RULES
+from ..model.environment import Boundary, Task
+from .forward import RobotKinematics
+from .qpos import Slot, layout
+from .transforms import Array, angles_from_quaternion, quaternion_from_angles, wrap
+from .tree import DofKind
+
+_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
+_POSITIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+
+
+class ConfigurationSpace:
+    """Limits, units and topology of a scene's degrees of freedom.
+
+    Args:
+        robots: All robots.
+        names: One name for each degree of freedom.
+        homes: The home configuration of each robot.
+        boundary: In metres; a base keeps within it.
+        scale: Metres per file unit.
+        sample_box: Corners of the box that degrees of freedom without limits are drawn from.
+
+    Attributes:
+        names: One name for each degree of freedom.
+        robot_slices: The columns of each robot.
+        lower, upper: (dim,) limits in radians and metres; infinite where there are none.
+        periodic: (dim,) whether the degree of freedom is an angle that turns without end.
+        home: (dim,) the configuration that the files describe.
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[RobotKinematics],
+        names: Sequence[str],
+        homes: Sequence[Array],
+        boundary: Boundary | None,
+        scale: float,
+        sample_box: tuple[Array, Array],
+    ) -> None:
+        self.names = tuple(names)
+        stops = np.cumsum([0, *(r.dim for r in robots)])
+        self.robot_slices = tuple(slice(int(a), int(b)) for a, b in pairwise(stops))
+        dofs = [d for r in robots for d in r.dofs]
+        self.lower = np.array([d.lower for d in dofs], dtype=np.float64)
+        self.upper = np.array([d.upper for d in dofs], dtype=np.float64)
+        self.periodic: NDArray[np.bool_] = np.array([d.periodic for d in dofs], dtype=bool)
+        self.home = np.concatenate([np.zeros(0), *homes])
+        # Radians or metres for one unit of the file's numbers.
+        self._units = np.array(
+            [
+                scale if d.kind.is_length else RULES[r.multibody.dialect].configuration_angle
+                for r in robots
+                for d in r.dofs
+            ],
+            dtype=np.float64,
+        )
+        base = [d.kind if d.connection is None and d.kind.is_length else None for d in dofs]
+        self._axis = np.array([-1 if k is None else _POSITIONS.index(k) for k in base], dtype=np.int64)
+        self._is_length = np.array([d.kind.is_length for d in dofs], dtype=bool)
+        self._bound_bases(boundary)
+        self._slots, self.nq = layout(robots, self.robot_slices)
+        self._sample_box = sample_box
+        for array in (self.lower, self.upper, self.periodic, self.home, self._units):
+            array.setflags(write=False)
+
+    @property
+    def dim(self) -> int:
+        """Number of degrees of freedom of all robots."""
+        return len(self.names)
+
+    @property
+    def slots(self) -> tuple[tuple[Slot, ...], ...]:
+        """For each robot its joints and free bases, in the order of MuJoCo's qpos."""
+        return self._slots
+
+    def check(self, q: ArrayLike) -> Array:
+        """Return configurations as a float64 array of shape (dim,) or (n, dim).
+
+        Raises:
+            ValueError: The shape is wrong, or a value is not finite; the message names the degree of freedom.
+        """
+        try:
+            values = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"q holds something that is no number: {error}") from error
+        if values.ndim not in (1, 2) or values.shape[-1] != self.dim:
+            listed = ", ".join(self.names[:12]) + (", ..." if self.dim > 12 else "")
+            raise ValueError(
+                f"configurations of shape {values.shape}; expected ({self.dim},) or (n, {self.dim})"
+                f"{f': {listed}' if self.dim else ''}"
+            )
+        finite = np.isfinite(values)
+        if not finite.all():
+            where = np.argwhere(~finite)[0]
+            row = f" in row {where[0]}" if values.ndim == 2 else ""
+            raise ValueError(f"{self.names[where[-1]]} is {values[tuple(where)]}{row}; expected a finite number")
+        return values
+
+    def decode(self, cfg: ArrayLike) -> Array:
+        """Turn the file's numbers (..., dim) into q: turns (dialect A) or fractions of pi, and raw lengths."""
+        return self._last_axis(cfg, "cfg") * self._units
+
+    def encode(self, q: ArrayLike) -> Array:
+        """Turn q (..., dim) into the file's numbers."""
+        return self._last_axis(q, "q") / self._units
+
+    def of_task(self, task: Task) -> Array:
+        """Return a task's configurations, (k, dim), with the other robots at home."""
+        columns = self.robot_slices[task.robot]
+        q = np.tile(self.home, (len(task.configurations), 1))
+        q[:, columns] = np.array(task.configurations, dtype=np.float64).reshape(len(q), -1) * self._units[columns]
+        return q
+
+    def qpos(self, q: ArrayLike) -> Array:
+        """Turn q (..., dim) into MuJoCo's qpos (..., nq)."""
+        values = self._last_axis(q, "q")
+        qpos = np.zeros((*values.shape[:-1], self.nq))
+        for slot in self._all_slots():
+            if not slot.free:
+                qpos[..., slot.address] = values[..., slot.columns[0]]
+                continue
+            x = slot.columns[0]
+            qpos[..., slot.address : slot.address + 3] = values[..., x : x + 3]
+            angles = (values[..., x + 3], values[..., x + 4], values[..., x + 5])
+            qpos[..., slot.address + 3 : slot.address + 7] = quaternion_from_angles(*angles)
+        return qpos
+
+    def from_qpos(self, qpos: ArrayLike) -> Array:
+        """Turn MuJoCo's qpos (..., nq) into q (..., dim).
+
+        Angles of a free base are the representatives nearest zero; loop-closing degrees of freedom, which qpos does
+        not hold, are those of home.
+        """
+        values = np.asarray(qpos, dtype=np.float64)
+        if values.shape[-1:] != (self.nq,):
+            raise ValueError(f"qpos of shape {values.shape}; expected (..., {self.nq})")
+        q = np.broadcast_to(self.home, (*values.shape[:-1], self.dim)).copy()
+        for slot in self._all_slots():
+            if not slot.free:
+                q[..., slot.columns[0]] = values[..., slot.address]
+                continue
+            x = slot.columns[0]
+            q[..., x : x + 3] = values[..., slot.address : slot.address + 3]
+            quaternion = values[..., slot.address + 3 : slot.address + 7]
+            q[..., x + 3], q[..., x + 4], q[..., x + 5] = angles_from_quaternion(_unit(quaternion))
+        return q
+
+    def sample(self, n: int, seed: int) -> Array:
+        """Draw n configurations uniformly between the limits, (n, dim); equal seeds give equal draws.
+
+        A degree of freedom without limits is drawn from the box of the obstacles grown by the robots' radius, or
+        from twice that radius where there are no obstacles.
+        """
+        lower, upper = self.sample_limits
+        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+
+    @property
+    def sample_limits(self) -> tuple[Array, Array]:
+        """The finite limits that `sample` draws between, (dim,) each."""
+        box_lower, box_upper = self._sample_box
+        lower, upper = self.lower.copy(), self.upper.copy()
+        half = float(np.max(box_upper - box_lower)) / 2
+        for i in range(self.dim):
+            axis = self._axis[i]
+            low, high = (box_lower[axis], box_upper[axis]) if axis >= 0 else (-half, half)
+            if not np.isfinite(lower[i]):
+                lower[i] = low if np.isinf(upper[i]) else min(low, upper[i] - 2 * half)
+            if not np.isfinite(upper[i]):
+                upper[i] = high if high > lower[i] else lower[i] + 2 * half
+        return lower, upper
+
+    def interpolate(self, q0: ArrayLike, q1: ArrayLike, n: int) -> Array:
+        """Return n configurations on the straight way from q0 to q1, (n, dim), both ends included.
+
+        Periodic degrees of freedom go the short way round; the last row equals q1 up to whole turns.
+
+        Raises:
+            ValueError: n is below 2, or q0 or q1 is no configuration.
+        """
+        if n < 2:
+            raise ValueError(f"n is {n}; expected at least 2, for both ends")
+        start, delta = self.check(q0), self.difference(q0, q1)
+        if delta.ndim != 1 or start.ndim != 1:
+            raise ValueError(f"q0 and q1 of shapes {np.shape(q0)} and {np.shape(q1)}; expected two of ({self.dim},)")
+        return start + np.linspace(0.0, 1.0, n)[:, None] * delta
+
+    def difference(self, q0: ArrayLike, q1: ArrayLike) -> Array:
+        """Return the way from q0 to q1, (..., dim): the short way round on periodic degrees of freedom."""
+        delta = self.check(q1) - self.check(q0)
+        return np.where(self.periodic, wrap(delta), delta)
+
+    def within_limits(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """Return whether configurations (..., dim) keep the limits of their joints, closed.
+
+        Periodic angles always do. So do the positions of bases: the boundary is one of vertices, and the origin of a
+        body may lie outside its mesh.
+        """
+        return ~np.any(self.broken(q), axis=-1)
+
+    def broken(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """Return which degrees of freedom are beyond their limits, (..., dim); see `within_limits`."""
+        values = self._last_axis(q, "q")
+        lower, upper = self.joint_limits
+        return (values < lower) | (values > upper)
+
+    @property
+    def joint_limits(self) -> tuple[Array, Array]:
+        """The limits that `within_limits` asks for, (dim,) each: infinite for periodic angles and bases' positions."""
+        free = self.periodic | (self._axis >= 0)
+        return np.where(free, -np.inf, self.lower), np.where(free, np.inf, self.upper)
+
+    def _bound_bases(self, boundary: Boundary | None) -> None:
+        """A base stays within the boundary, as its vertices do."""
+        if boundary is None:
+            return
+        low = boundary.lower or tuple(c - boundary.radius for c in boundary.center)
+        high = boundary.upper or tuple(c + boundary.radius for c in boundary.center)
+        for axis in range(len(low)):
+            self.lower[self._axis == axis] = low[axis]
+            self.upper[self._axis == axis] = high[axis]
+
+    def _all_slots(self) -> Iterator[Slot]:
+        for robot in self._slots:
+            yield from robot
+
+    def _last_axis(self, values: ArrayLike, what: str) -> Array:
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape[-1:] != (self.dim,):
+            raise ValueError(f"{what} of shape {array.shape}; expected (..., {self.dim})")
+        return array
+
+
+def _unit(quaternion: Array) -> Array:
+    """Return unit quaternions; the zero quaternion counts as no rotation, as in MuJoCo."""
+    norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    return np.where(norm > 0, quaternion / np.where(norm > 0, norm, 1.0), (1.0, 0.0, 0.0, 0.0))

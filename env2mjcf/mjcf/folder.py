@@ -1,0 +1,179 @@
+"""The folder that scenes are written into, by several processes at once if need be.
+
+A writer first puts its MJCF there under a staged name, which tells every other process what assets it counts on, then
+the assets that are missing, then lets MuJoCo load it, and renames it last. Whoever changes the folder holds its lock:
+nobody removes an asset between another's look at it and the MJCF that names it. The lock is not held while MuJoCo
+loads. It is a lock of the folder itself, so it leaves no file behind, and a process that dies leaves it open.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from ..system.files import NoRegularFileError, open_regular, replaced
+from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock
+
+# What a killed process leaves is removed when it is as old as this, if nobody holds it.
+STALE_SECONDS = 3600.0
+
+_STAGED = re.compile(r"\..+-[0-9a-f]{16}\.xml")
+_STAGED_ASSET = re.compile(r"\.[0-9a-f]{16}-[^/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml)")
+_ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
+
+_BINARY = getattr(os, "O_BINARY", 0)
+
+
+class Staged:
+    """A scene that is written but does not have its name yet.
+
+    Args:
+        folder: Where it is; made if need be.
+        name: What it will be called, without `.xml`.
+        xml: The MJCF.
+        assets: The files that it names, by their paths in the folder.
+
+    Raises:
+        FolderBusyError: Another process does not let anybody write.
+        OSError: It cannot be written.
+    """
+
+    def __init__(self, folder: Path, name: str, xml: bytes, assets: Mapping[str, bytes]) -> None:
+        self.folder = folder
+        self.final = folder / f"{name}.xml"
+        self.path = folder / _staged_name(name)
+        self.assets = tuple(folder / relative for relative in assets)
+        self._made: set[str] = set()
+        self._retired: Path | None = None
+        self._handle, self._begun = -1, False
+        (folder / "assets").mkdir(parents=True, exist_ok=True)
+        try:
+            with alone(folder):
+                with suppress(OSError):
+                    _remove_stale(folder)
+                self._begun = True
+                self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o666)
+                # Held for as long as this process needs it: it is not stale, however old it is.
+                try_lock(self._handle)
+                _write_whole(self._handle, xml)
+                for relative, data in assets.items():
+                    self._provide(folder / relative, data)
+        except BaseException:
+            self.discard()
+            raise
+
+    def _provide(self, path: Path, data: bytes) -> None:
+        # The name holds the hash of the content: what is there and whole is right.
+        if path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data:
+            return
+        with replaced(path) as beside:
+            beside.write_bytes(data)
+        self._made.add(path.name)
+
+    def commit(self) -> None:
+        """Give the scene its name, and remove the assets that only the scene of that name before it used.
+
+        Raises:
+            FolderBusyError: Another process does not let anybody write.
+            OSError: It cannot be renamed; `discard` then removes what was written.
+        """
+        with alone(self.folder):
+            self._close()
+            self._retire()
+            os.replace(self.path, self.final)
+            # The scene is there: what cannot be tidied up is no reason to say that it is not.
+            with suppress(OSError):
+                self._remove_retired()
+
+    def _retire(self) -> None:
+        """Keep the scene of this name that was there before under a staged name, if it has assets that go with it.
+
+        Whoever comes after a process that is killed knows from it what to remove.
+        """
+        if _named(self.final) <= {asset.name for asset in self.assets}:
+            return
+        self._retired = self.path.with_name(_staged_name(self.final.stem))
+        self._retired.write_bytes(self.final.read_bytes())
+
+    def _remove_retired(self) -> None:
+        if self._retired is not None:
+            _remove(self.folder, self._retired)
+
+    def discard(self) -> None:
+        """Remove the staged MJCF and the assets that were written for it."""
+        self._close()
+        if not self._begun:
+            return
+        with suppress(OSError, FolderBusyError), alone(self.folder):
+            _remove(self.folder, self.path, self._made)
+            self._remove_retired()
+
+    def _close(self) -> None:
+        handle, self._handle = self._handle, -1
+        if handle >= 0:
+            os.close(handle)
+
+
+def _staged_name(name: str) -> str:
+    return f".{name}-{secrets.token_hex(8)}.xml"
+
+
+def _write_whole(handle: int, data: bytes) -> None:
+    left = memoryview(data)
+    while left:
+        left = left[os.write(handle, left) :]
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove what killed processes have left: staged files, and assets that only those name."""
+    for staged in _old(folder, _STAGED):
+        handle = os.open(staged, os.O_RDONLY)
+        try:
+            if try_lock(handle) is not LockOutcome.TAKEN:
+                _remove(folder, staged)
+        finally:
+            os.close(handle)
+    for staged in _old(folder / "assets", _STAGED_ASSET):
+        staged.unlink(missing_ok=True)
+
+
+def _old(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
+    before = time.time() - STALE_SECONDS
+    with os.scandir(folder) as listing:
+        return [
+            Path(item.path) for item in listing
+            if pattern.fullmatch(item.name) and item.is_file(follow_symlinks=False) and item.stat().st_mtime < before
+        ]  # fmt: skip
+
+
+def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> None:
+    """Remove a staged scene, and before it those of its assets (or of the given ones) that no other scene names.
+
+    Raises:
+        OSError: The folder, or another scene, cannot be read, and may name any of them.
+    """
+    left = _named(staged) if names is None else set(names)
+    if left:
+        # Not by `Path.glob`, which takes a folder that cannot be listed for an empty one.
+        with os.scandir(folder) as listing:
+            scenes = [Path(item.path) for item in listing if item.name.endswith(".xml")]
+        for scene in scenes:
+            if scene != staged:
+                left -= _named(scene)
+    for name in left:
+        (folder / "assets" / name).unlink(missing_ok=True)
+    staged.unlink(missing_ok=True)
+
+
+def _named(xml: Path) -> set[str]:
+    """Return the asset files that an MJCF file names."""
+    try:
+        with open_regular(xml) as file:
+            return set(_ASSET.findall(file.read().decode("utf-8", "replace")))
+    except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
+        return set()

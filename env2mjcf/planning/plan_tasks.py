@@ -1,0 +1,195 @@
+"""From start to goal: a planner finds a way, every edge of it is proved, and it is made shorter."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from importlib.util import find_spec
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import DiagnosticLog
+from ..errors import FormatError
+from ..kinematics.transforms import Array
+from ..options import positive, whole
+from ..simulation.scene import Scene
+from ..simulation.verdicts import Judge
+from ..system.locks import Lock
+from .planner_space import PlanningSpace
+from .planners import known
+from .result import Plan, Progress, Watch
+from .segment import Leg, LegResult
+
+# OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
+# depend on which of them is quicker.
+_one_at_a_time = Lock()
+# Extents; finer steps find nothing that the proofs would not, and their number has no end.
+_FINEST = 1e-5
+
+
+def plan(
+    scene: Scene,
+    start: ArrayLike,
+    goal: ArrayLike,
+    *,
+    planner: str = "auto",
+    robot: int | None = None,
+    time: float = 60.0,
+    seed: int = 0,
+    resolution: float | None = None,
+    shorten: bool = True,
+    progress: Callable[[Progress], None] | None = None,
+) -> Plan:
+    """Plan a way from start to goal.
+
+    Every edge of a solution is checked at steps much finer than the planner's, and proved to be free where it keeps
+    1e-5 of the extent away from everything (`Scene.edge_is_free`). Equal seeds give equal paths, unless time runs out.
+    A process plans one way at a time: a call in another thread waits, and its time begins afterwards.
+
+    Args:
+        scene: The scene.
+        start: (dim,) all robots.
+        goal: (dim,). With `robot`, its numbers for the other robots count for nothing.
+        planner: One of `PLANNERS`, in any case.
+        robot: Index of the robot that moves, the others staying as they are in `start`; None moves all.
+        time: Seconds after which to give up.
+        seed: Of the random numbers, zero or more.
+        resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner; None
+            takes the file's PositionRes, else 0.01 extent. Where a solution turns out to pass over something, it is
+            planned anew with finer steps.
+        shorten: Make the path shorter.
+        progress: Called a few times a second.
+
+    Raises:
+        TypeError: planner is no name, or robot, time, seed or resolution no number of the right kind.
+        FormatError: The file's PositionRes is too small to plan with.
+        ValueError: Start or goal is no configuration, or not valid with the other robots as they are in `start` (the
+            message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
+            resolution is out of range.
+    """
+    rows = np.stack([_one(scene, start), _one(scene, goal)])
+    return plan_through(
+        scene, rows, planner=planner, robot=robot, time=time, seed=seed, resolution=resolution, shorten=shorten,
+        progress=progress,
+    )  # fmt: skip
+
+
+def plan_through(
+    scene: Scene,
+    q: ArrayLike,
+    *,
+    planner: str = "auto",
+    robot: int | None = None,
+    time: float = 60.0,
+    seed: int = 0,
+    resolution: float | None = None,
+    shorten: bool = True,
+    progress: Callable[[Progress], None] | None = None,
+) -> Plan:
+    """Plan a way through configurations, (k, dim), one leg after the other; see `plan`.
+
+    With `robot`, the others stay as they are in the first configuration.
+    """
+    rows, name = scene.space.check(q), known(planner)
+    _refuse(scene, rows, robot, time, seed)
+    step = _step(scene, resolution)
+    columns = _columns(scene, robot)
+    rows = _others_as_at_start(rows, columns)
+    _refuse_invalid(scene, rows)
+    if find_spec("ompl") is None:
+        raise ValueError(f"planner {name} needs one more package: pip install 'env2mjcf[planning]'")
+    scene.warm_up()
+    space = PlanningSpace(scene, rows, columns)
+    with _one_at_a_time:
+        watch = Watch(time, len(rows) - 1, progress)
+        began, results = clock.perf_counter(), list[LegResult]()
+        for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
+            watch.leg = number
+            leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
+            results.append(leg.plan(start, goal))
+            if not results[-1].solved:
+                break
+        return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
+
+
+def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:
+    path = np.concatenate([legs[0].path[:1], *(leg.path[1:] for leg in legs)])
+    return Plan(
+        solved=legs[-1].solved,
+        path=space.full(path),
+        certified=np.concatenate([leg.certified for leg in legs]),
+        dense=np.concatenate([leg.dense for leg in legs]),
+        planner=", ".join(dict.fromkeys(leg.planner for leg in legs)),
+        seconds=seconds,
+        checks=checks,
+        length=space.path_length(path),
+        left=legs[-1].left,
+        resolution=min(leg.resolution for leg in legs),
+        fine_step=max(leg.fine_step for leg in legs),
+        seed=seed,
+    )
+
+
+def _one(scene: Scene, q: ArrayLike) -> Array:
+    row = scene.space.check(q)
+    if row.ndim != 1:
+        raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({scene.space.dim},)")
+    return row
+
+
+def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
+    every = np.arange(scene.space.dim)
+    return every if robot is None else every[scene.space.robot_slices[robot]]
+
+
+def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
+    """Return what the robots go through: in every row, what does not move is as in the first."""
+    stay = np.repeat(rows[:1], len(rows), axis=0)
+    stay[:, columns] = rows[:, columns]
+    return stay
+
+
+def _step(scene: Scene, resolution: float | None) -> float:
+    """Return the planner's step in metres."""
+    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    least = _FINEST * scene.extent
+    if step >= least:
+        return step
+    if resolution is not None:
+        raise ValueError(f"resolution is {resolution}; expected at least {least:.3g} m, 1e-5 of the extent")
+    of_file = scene.environment.resolution
+    DiagnosticLog().fail(
+        FormatError, "CFG536", "PositionRes", f"PositionRes {of_file.position:g}: planning takes steps of at least "
+        f"{least:.3g} m, 1e-5 of the extent", hint="correct PositionRes, or give --resolution", span=of_file.span,
+    )  # fmt: skip
+
+
+def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int) -> None:
+    """Raise a TypeError or ValueError for arguments that nothing can be planned with."""
+    robots = len(scene.space.robot_slices)
+    if not scene.space.dim:
+        raise ValueError("nothing can move: the scene has no degrees of freedom")
+    if rows.ndim != 2 or len(rows) < 2:
+        raise ValueError(f"configurations of shape {rows.shape}; expected a start and a goal, (k, {scene.space.dim})")
+    if robot is not None and not 0 <= whole("robot", robot, 0) < robots:
+        raise ValueError(f"there is no robot {robot}; the scene has {robots}, counted from 0")
+    if robot is not None and not len(_columns(scene, robot)):
+        raise ValueError(f"nothing can move: robot {robot} has no degrees of freedom")
+    positive("time", time)
+    whole("seed", seed, 0)
+
+
+def _refuse_invalid(scene: Scene, rows: Array) -> None:
+    """Raise a ValueError that says who touches in the first configuration that is not valid."""
+    judge = Judge(scene, rows, names_of(len(rows)))
+    for i in np.flatnonzero(~judge.valid):
+        verdict = judge.verdict(int(i))
+        raise ValueError(f"the {verdict.label} is not valid: {'; '.join(verdict.reasons())}")
+
+
+def names_of(count: int) -> list[str]:
+    """Return what the configurations of a query are called: start, via points, goal."""
+    vias = ["via point"] if count == 3 else [f"via point {i}" for i in range(1, count - 1)]
+    return ["start", *vias, "goal"]

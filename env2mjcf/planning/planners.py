@@ -1,0 +1,131 @@
+"""The names of the planners.
+
+MERGED: Several planners that take turns, until one of them is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from typing import Protocol
+
+from ..errors import did_you_mean
+from ..kinematics.transforms import Array
+from .planner_space import PlanningSpace, Validity
+
+# The names that are asked for, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
+# RRT*) cannot have one with circles for angles.
+OMPL_PLANNERS = {
+    "RRTConnect": "RRTConnect",
+    "RRT": "RRT",
+    "RRTstar": "RRTstar",
+    "KPIECE": "KPIECE1",
+    "BKPIECE": "BKPIECE1",
+    "LBKPIECE": "LBKPIECE1",
+    "PRM": "PRM",
+    "PRMstar": "PRMstar",
+    "FMT": "FMT",
+    "BFMT": "BFMT",
+}
+BATCH = "BatchEST"
+"""The planner of our own, which asks in batches."""
+
+AUTO = ("RRTConnect", BATCH)
+"""The planners that `auto` lets take turns: the quick one, and one for narrow places."""
+
+OPTIMISING = ("RRTstar", "PRMstar")
+"""Planners that go on improving what they have found for as long as they may."""
+
+PLANNERS = ("auto", *OMPL_PLANNERS, BATCH)
+
+
+def known(name: str) -> str:
+    """Return the name of a planner as it is listed, whatever its case; OMPL's own names will do.
+
+    Raises:
+        TypeError: It is no word.
+        ValueError: There is no such planner; the message lists all.
+    """
+    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"planner is {name!r}; expected one of {', '.join(PLANNERS)}")
+    spelled = {n.lower(): n for n in PLANNERS} | {c.lower(): n for n, c in OMPL_PLANNERS.items()}
+    if name.lower() not in spelled:
+        guess = did_you_mean(name, PLANNERS)
+        raise ValueError(
+            f"there is no planner {name!r}{f'; {guess}' if guess else ''} (planners: {', '.join(PLANNERS)})"
+        )
+    return spelled[name.lower()]
+
+
+def installed(name: str) -> str:
+    """Return the name of a planner as it is listed; see `known`.
+
+    Raises:
+        ValueError: There is no such planner, or OMPL is not installed.
+    """
+    spelled = known(name)
+    if find_spec("ompl") is None:
+        raise ValueError(f"planner {spelled} needs one more package: pip install 'env2mjcf[planning]'")
+    return spelled
+
+
+# The first turn of each planner, in checks; every round doubles it. Counted in checks and not in seconds, turns are the
+# same in every run.
+_FIRST_TURN = 100_000
+
+
+class Run(Protocol):
+    """A planner at work, which can be stopped and go on."""
+
+    name: str
+
+    def solve(self, stop: Callable[[], bool]) -> bool:
+        """Plan until there is a solution, or until it is to stop; return whether there is one."""
+        ...
+
+    def path(self) -> Array | None:
+        """Return the solution, or else the way to what came nearest to the goal, (k, d); None without any."""
+        ...
+
+
+class Counted(Run, Protocol):
+    """One that tells how much it has looked at."""
+
+    validity: Validity
+
+
+class Turns:
+    """Planners that take turns.
+
+    Attributes:
+        name: Who has found the solution; before that, who takes turns.
+
+    Args:
+        runs: Planners for the same start and goal.
+        space: What they move.
+        goal: (d,).
+    """
+
+    def __init__(self, runs: Sequence[Counted], space: PlanningSpace, goal: Array) -> None:
+        self._runs, self._space, self._goal = runs, space, goal
+        self._solved: Run | None = None
+        self.name = " and ".join(run.name for run in runs)
+        self._turn = _FIRST_TURN
+
+    def solve(self, stop: Callable[[], bool]) -> bool:
+        """Let them plan until one has a solution, or until they are to stop."""
+        while not stop():
+            for run in self._runs:
+                end = run.validity.checks + self._turn
+                if run.solve(lambda run=run, end=end: stop() or run.validity.checks >= end):
+                    self._solved, self.name = run, run.name
+                    return True
+            self._turn *= 2
+        return False
+
+    def path(self) -> Array | None:
+        """Return the solution, or else the best approach of all."""
+        if self._solved is not None:
+            return self._solved.path()
+        paths = [path for run in self._runs if (path := run.path()) is not None]
+        return min(paths, key=lambda p: self._space.distance(p[-1], self._goal), default=None)

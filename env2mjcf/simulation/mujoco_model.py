@@ -1,0 +1,92 @@
+"""Loads compiled scenes into MuJoCo, and tells its errors in the words of the env file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+import mujoco
+
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError, Span
+from ..geometry.assembly import Assembly
+from ..mjcf.compiler import Document
+
+_QUOTED = re.compile(r"'([^']+)'")
+_LINE = re.compile(r"\bline (\d+)")
+_NAME = re.compile(r'\b(?:name|mesh|body1|geom1|joint)="([^"]+)"')
+
+
+def load_model(document: Document, assembly: Assembly, log: DiagnosticLog) -> mujoco.MjModel:
+    """Compile a document in memory.
+
+    Raises:
+        ConversionError: MuJoCo refuses it; the error has the line of the env file that the refusal comes from.
+    """
+    return _compiled(lambda: load_spec(document), document, assembly, log)
+
+
+def load_spec(document: Document) -> mujoco.MjSpec:
+    """Parse a document into a spec that holds its assets, ready to be attached to another one."""
+    with mujoco.MjVfs() as vfs:
+        vfs["model.xml"] = document.xml.encode("utf-8")
+        for name, data in document.assets.items():
+            vfs[name] = data
+        spec = mujoco.MjSpec.from_file("model.xml", vfs=vfs)
+    # Paths of assets are relative to the folder of the model; the dictionary stays with the spec.
+    spec.assets = {Path(n).name: d for n, d in document.assets.items() if not n.endswith(".xml")}
+    return spec
+
+
+def load_file(path: Path, document: Document, assembly: Assembly, log: DiagnosticLog) -> mujoco.MjModel:
+    """Load a written MJCF file, as a user does.
+
+    Raises:
+        ConversionError: MuJoCo refuses it.
+    """
+    # Loading it without a spec, MuJoCo writes its warnings to a file in the current folder.
+    return _compiled(lambda: mujoco.MjSpec.from_file(str(path)), document, assembly, log)
+
+
+def _compiled(
+    spec: Callable[[], mujoco.MjSpec], document: Document, assembly: Assembly, log: DiagnosticLog
+) -> mujoco.MjModel:
+    try:
+        return spec().compile()
+    except UserWarning as warning:
+        said = " ".join(str(warning).split())
+        log.fail(
+            ConversionError, "MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}",
+            hint="correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)",
+        )  # fmt: skip
+    except ValueError as error:
+        _refuse(" ".join(str(error).split()), document, assembly, log)
+
+
+def _refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> NoReturn:
+    """Raise MuJoCo's refusal as a `ConversionError` about the body that it concerns."""
+    subject, span = _culprit(message, document, assembly)
+    log.fail(
+        ConversionError, "MJC401", subject or document.name,
+        f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {message}",
+        hint="" if span else "this may be a fault of env2mjcf: please report it with the scene", span=span,
+    )  # fmt: skip
+
+
+def _culprit(message: str, document: Document, assembly: Assembly) -> tuple[str, Span | None]:
+    """Find the body that a message is about: by a name it quotes, else by the line of the MJCF that it gives."""
+    spans: dict[str, Span | None] = {p.name: p.body.span for p in assembly.parts()}
+    by_mesh = {p.mesh.name: p.body.span for p in assembly.parts()}
+    candidates = _QUOTED.findall(message)
+    line = _LINE.search(message)
+    if line and int(line.group(1)) <= document.xml.count("\n"):
+        candidates += _NAME.findall(document.xml.splitlines()[int(line.group(1)) - 1])
+    for candidate in candidates:
+        for name in (candidate, candidate.rpartition(":")[0], candidate.rpartition(".")[0]):
+            if name in spans:
+                return name, spans[name]
+            if name in by_mesh:
+                return name, by_mesh[name]
+    return "", None

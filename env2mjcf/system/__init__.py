@@ -1,0 +1,1 @@
+"""Files, folders, locks: what the operating system is asked for."""

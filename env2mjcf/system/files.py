@@ -1,0 +1,269 @@
+"""Files that appear whole or not at all.
+
+MERGED: Opens files that somebody else has made, or may have put something else in the place of.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from ..diagnostics import DiagnosticLog
+from ..errors import ConversionError
+from ..options import PathArgument
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# Of a file, as much as tells what it is.
+_BEGINNING = 4096
+
+
+@contextmanager
+def replaced(file: str | os.PathLike[str]) -> Generator[Path]:
+    """Let a file be written beside its place, then rename it there; remove it where writing fails.
+
+    Yields:
+        The path to write to; it ends as the file does.
+
+    Raises:
+        OSError: It cannot be written, or something stands there that is no regular file, such as a device.
+    """
+    path = Path(os.fsdecode(file))
+    _refuse_special(path)
+    beside = _beside(path)
+    try:
+        yield beside
+        os.replace(beside, path)
+    except BaseException:
+        # What went wrong is worth more than what this would say.
+        with suppress(OSError):
+            beside.unlink()
+        raise
+
+
+@contextmanager
+def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
+    """Let a file be written as `replaced` does, and say what the system has against it.
+
+    Args:
+        file: The file to write.
+        code: The code of the diagnostic.
+
+    Raises:
+        ConversionError: It cannot be written.
+    """
+    with _said(file, code), replaced(file) as beside:
+        yield beside
+
+
+def write_together(contents: Mapping[Path, bytes], code: str) -> None:
+    """Write several files, or leave all as they were where one cannot be written.
+
+    All are written beside their places, and what they replace is copied, before the first is renamed; an error then
+    takes back what was renamed. A process that is killed between two renames leaves the first files new, the others
+    old, and what lies beside them.
+
+    Args:
+        contents: What to write, in the order in which it is renamed.
+        code: The code of the diagnostic.
+
+    Raises:
+        ConversionError: A file cannot be written.
+    """
+    replacements = {path: _Replacement(path, _beside(path), _beside(path)) for path in contents}
+    try:
+        for path, data in contents.items():
+            with _said(path, code):
+                replacements[path].stage(data)
+        for path, replacement in replacements.items():
+            with _said(path, code):
+                replacement.rename()
+    except BaseException:
+        for replacement in replacements.values():
+            with suppress(OSError):
+                replacement.take_back()
+        raise
+    copies = [replacement.old for replacement in replacements.values()]
+    try:
+        _remove(copies)
+    except BaseException:
+        _remove(copies)  # an interrupt waits for it
+        raise
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+@dataclass(slots=True)
+class _Replacement:
+    """A file that is replaced together with others.
+
+    Attributes:
+        path: Its place.
+        new: What comes there.
+        old: A copy of what is there; missing where nothing is.
+        begun: Whether it may have been renamed: an interrupt may come as soon as it is.
+    """
+
+    path: Path
+    new: Path
+    old: Path
+    begun: bool = False
+
+    def stage(self, data: bytes) -> None:
+        _refuse_special(self.path)
+        if os.path.lexists(self.path):
+            shutil.copy2(self.path, self.old, follow_symlinks=False)
+        self.new.write_bytes(data)
+
+    def rename(self) -> None:
+        self.begun = True
+        os.replace(self.new, self.path)
+
+    def take_back(self) -> None:
+        """Put back what was there; a copy that cannot be put back stays where it is."""
+        if not self.begun or self.new.exists():
+            self.new.unlink(missing_ok=True)
+            self.old.unlink(missing_ok=True)
+        elif os.path.lexists(self.old):
+            os.replace(self.old, self.path)
+        else:
+            self.path.unlink()
+
+
+def _refuse_special(path: Path) -> None:
+    if "\0" in path.name:
+        raise OSError(errno.EINVAL, "its name holds a NUL character", str(path))
+    # Renaming would put a file in the place of /dev/null.
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{secrets.token_hex(8)}-{path.name}")
+
+
+@contextmanager
+def _said(file: str | os.PathLike[str], code: str) -> Generator[None]:
+    """Say what the system has against a file that is written."""
+    try:
+        yield
+    except OSError as error:
+        path = os.fsdecode(file)
+        full = error.errno in _FULL
+        DiagnosticLog().fail(
+            ConversionError, code, path, f"{path} cannot be written: {error.strerror or error}",
+            hint=f"{'make room, or ' if full else ''}choose another file; its folder must exist",
+        )  # fmt: skip
+
+
+def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgument] = ()) -> None:
+    """Refuse a file that cannot be written, before time is spent on its content.
+
+    Args:
+        out: The file to write.
+        code: The code of the diagnostic.
+        inputs: Files that are read for it, those that are not there, too.
+
+    Raises:
+        ConversionError: It is a folder, one of the inputs, or lies in no folder, or in one that may not be written, or
+            no file can have its name.
+    """
+    path = Path(os.fsdecode(out))
+    if reason := _against_name(path):
+        what = f"cannot be written: {reason}"
+    elif path.is_dir():
+        what = "is a folder"
+    elif path.exists() and any(os.path.exists(i) and os.path.samefile(path, i) for i in inputs):
+        what = "is an input"
+    elif path.exists() and not path.is_file():
+        what = "is no regular file"
+    elif not path.parent.is_dir():
+        what = f"lies in {path.parent}, which is no folder"
+    elif not os.access(path.parent, os.W_OK):
+        what = f"lies in {path.parent}, which may not be written"
+    else:
+        return
+    DiagnosticLog().fail(
+        ConversionError, code, str(path), f"{path} {what}; expected a file to write", hint="name another output"
+    )
+
+
+def _against_name(path: Path) -> str:
+    """Return what the system has against the name of a file, that it is too long, say."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        return error.strerror or str(error)
+    except ValueError as error:  # it holds a NUL character
+        return str(error)
+    return ""
+
+
+def refuse_foreign(out: Path, code: str, kind: str, belongs: Callable[[bytes], bool]) -> None:
+    """Refuse to replace a file that is of another kind than what is written, such as a scene that was named by mistake.
+
+    Args:
+        out: The file to write.
+        code: The code of the diagnostic.
+        kind: What is written, as "path file".
+        belongs: Says of the beginning of a file whether it is of that kind; nobody misses one of white space only.
+
+    Raises:
+        ConversionError: It is of another kind, or cannot be read.
+    """
+    if not out.is_file():
+        return
+    try:
+        with out.open("rb") as file:
+            beginning = file.read(_BEGINNING)
+    except OSError:
+        what = "cannot be read"
+    else:
+        if not beginning.strip() or belongs(beginning):
+            return
+        what = f"is no {kind}"
+    DiagnosticLog().fail(
+        ConversionError, code, str(out), f"{out} {what}, and is not replaced",
+        hint="choose another output, or remove the file",
+    )  # fmt: skip
+
+
+class NoRegularFileError(OSError):
+    """A pipe, a socket or a device where a file was expected: it may keep its reader waiting for ever."""
+
+    def __init__(self, path: PathArgument) -> None:
+        super().__init__(errno.EINVAL, "it is no regular file but a pipe, a socket or a device", os.fspath(path))
+
+
+def open_regular(path: PathArgument) -> IO[bytes]:
+    """Open a regular file to read from it, and wait for nothing.
+
+    Raises:
+        NoRegularFileError: It is a pipe, a socket or a device.
+        OSError: It is a folder, or cannot be opened.
+        ValueError: There is a NUL character in its name.
+    """
+    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115  who asks closes it
+    # Asked of what is open: whatever bears the name by now may be another.
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise NoRegularFileError(path)
+    return file
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe would be waited for until somebody writes to it."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

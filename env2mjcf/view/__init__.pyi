@@ -1,0 +1,10 @@
+from .films import Film as Film
+from .films import film as film
+from .framing import Direction as Direction
+from .framing import Viewpoint as Viewpoint
+from .marks import Points as Points
+from .marks import Polyline as Polyline
+from .offscreen import RenderError as RenderError
+from .pictures import Segmentation as Segmentation
+from .pictures import picture as picture
+from .pictures import segmentation as segmentation

@@ -1,0 +1,1 @@
+"""The viewer on a web page."""

@@ -1,0 +1,175 @@
+"""The viewer: what is shown, and who may change it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kinematics.transforms import Array
+from ...simulation.scene import Scene
+from ...simulation.verdicts import LiveJudge
+from ..trails import paced, reference_points
+from .newest import Newest
+from .nodes import WebScene, set_stage
+from .page import Page
+from .playback import Player, Track
+from .sliders import Dials
+
+if TYPE_CHECKING:
+    import viser
+
+# Draws for one valid configuration before it is said that none was found.
+_DRAWS = 2000
+_TRAIL_POINTS = 240
+
+
+class Viewer:
+    """Shows one configuration of a scene on a page; sliders, buttons and the player change it.
+
+    All tabs that look at the page see the same.
+
+    Args:
+        server: The page.
+        scene: The scene.
+        path: (k, dim) configurations to be played, or None.
+
+    Attributes:
+        q: (dim,) what is shown.
+        page: The panel.
+    """
+
+    def __init__(self, server: viser.ViserServer, scene: Scene, path: Array | None = None) -> None:
+        self._server, self._scene = server, scene
+        # Reentrant: assigning to a slider calls back at once.
+        self._lock = threading.RLock()
+        self._judge = LiveJudge(scene)
+        shown = [q.q for q in scene.queries] + ([path] if path is not None else [])
+        rows = np.vstack([np.zeros((0, scene.space.dim)), *shown])
+        self._dials = Dials(scene, rows)
+        set_stage(server, scene, rows)
+        self._web = WebScene(server, scene)
+        self._track = None if path is None else Track(scene, path)
+        self._draws = 0
+        self._player: Player | None = None
+        first = self._first(path)
+        hidden = _is_enclosed(scene, first)
+        self._web.see_through(hidden)
+        self.page = Page(server, self._dials, scene, self._track, self, hidden)
+        if self._track is not None:
+            self._player = Player(self._track.seconds, self._tick, self.page.paused)
+            self._web.trail(reference_points(scene, paced(scene, self._track.q, _TRAIL_POINTS)[0]))
+        self._newest = Newest[Array](self._judge_shown)
+        self.q = scene.space.home.copy()
+        self.show(first)
+
+    def close(self) -> None:
+        """End its threads."""
+        self._newest.close()
+        if self._player is not None:
+            self._player.close()
+
+    def show(self, q: Array) -> None:
+        """Show a configuration, (dim,)."""
+        with self._lock:
+            self.q = q
+            with self._server.atomic():
+                self._web.place(self._scene.link_poses(q))
+                self.page.set_values(self._dials.values(q))
+            self._newest.submit(q)
+
+    def go(self, q: Array) -> None:
+        """Show a configuration that somebody chose: nothing plays any more."""
+        with self._lock:
+            self.pause()
+            self.show(q)
+
+    def turned(self, values: list[float]) -> None:
+        """Show what the sliders say."""
+        with self._lock:
+            q = self._dials.configuration(values)
+            if q is not None:
+                self.go(q)
+
+    def random(self) -> None:
+        """Show a valid configuration that is drawn at random."""
+        for _ in range(_DRAWS):
+            self._draws += 1
+            q = self._scene.space.sample(1, self._draws)[0]
+            if self._judge.valid(q):
+                self.go(q)
+                return
+        self.page.notify(f"no valid configuration among {_DRAWS} that were drawn")
+
+    def see_through(self, wanted: bool) -> None:
+        """Make obstacles transparent, or solid again."""
+        with self._lock:
+            self._web.see_through(wanted)
+
+    # The path.
+
+    def toggle(self) -> None:
+        """Play, or pause."""
+        with self._lock:
+            if self._player is None:
+                return
+            if self._player.playing:
+                self.pause()
+            else:
+                self._player.play()
+                self.page.playing()
+
+    def pause(self) -> None:
+        """Stay where the path is."""
+        if self._player is not None and self._player.playing:
+            self._player.pause()
+            self.page.paused()
+
+    def scrub(self, fraction: float) -> None:
+        """Show the path at a fraction of its length."""
+        with self._lock:
+            if self._player is None or self._track is None:
+                return
+            self.pause()
+            self._player.fraction = fraction
+            self.page.set_fraction(fraction)
+            self.show(self._track.at(fraction))
+
+    def set_pace(self, speed: float, loop: bool) -> None:
+        """Say how fast the path plays, and whether it begins again at its end."""
+        if self._player is not None:
+            self._player.speed, self._player.loop = speed, loop
+
+    def _tick(self, fraction: float) -> None:
+        with self._lock:
+            # Whoever paused it may have shown something else since.
+            if self._track is not None and self._player is not None and self._player.playing:
+                self.page.set_fraction(fraction)
+                self.show(self._track.at(fraction))
+
+    def _first(self, path: Array | None) -> Array:
+        if path is not None:
+            return path[0]
+        return self._scene.queries[0].q[0] if self._scene.queries else self._scene.space.home
+
+    def _judge_shown(self, q: Array, overtaken: Callable[[], bool]) -> None:
+        judgement = self._judge.verdict(q)
+        if judgement.contacts is None and not overtaken():
+            self.page.report(judgement, q)
+            judgement = self._judge.judge(q)
+        if judgement.contacts is not None:
+            with self._lock, self._server.atomic():
+                self.page.report(judgement, q)
+                self._web.mark(judgement.contacts)
+
+
+def _is_enclosed(scene: Scene, q: Array) -> bool:
+    """Return whether the box of an obstacle holds a whole robot, which might not be seen then."""
+    places = scene.link_poses(q)[:, :3, 3]
+    boxes: list[tuple[Array, Array]] = []
+    for part in scene.compiled.assembly.obstacles:
+        world = part.mesh.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
+        boxes.append((world.min(axis=0), world.max(axis=0)))
+    return len(places) > 0 and any(bool(np.all((places > low) & (places < high))) for low, high in boxes)
