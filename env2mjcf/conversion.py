@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .diagnostics import DiagnosticLog
-from .errors import ConversionError, Diagnostic
+from .errors import Diagnostic
 from .mjcf.folder import Staged
 from .model.environment import Environment
 from .options import Options, PathArgument
@@ -78,10 +78,8 @@ def _refuse_foreign(final: Path, log: DiagnosticLog) -> None:
         return
     text = re.sub(r"<\?.*?\?>|<!--.*?-->", "", _text(final), flags=re.DOTALL)
     if not text.lstrip().startswith("<mujoco"):
-        log.fail(
-            ConversionError, "MJC423", str(final), f"{final} is no MJCF, and is not replaced",
-            hint="choose another output folder, or name the file: out/scene.xml",
-        )  # fmt: skip
+        hint = "choose another output folder, or name the file: out/scene.xml"
+        log.fail("MJC423", str(final), f"{final} is no MJCF, and is not replaced", hint=hint)
 
 
 def _text(path: Path) -> str:
@@ -106,24 +104,13 @@ def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
     try:
         yield
     except (FileExistsError, NotADirectoryError):
-        log.fail(
-            ConversionError,
-            "MJC421",
-            str(folder),
-            f"{folder} is, or lies under, a file; expected a folder to write to",
-        )
+        log.fail("MJC421", str(folder), f"{folder} is, or lies under, a file; expected a folder to write to")
     except FolderBusyError as error:
-        log.fail(
-            ConversionError, "MJC424", str(folder), str(error),
-            hint="is one stopped in the middle of writing there? End it, or choose another output folder",
-        )  # fmt: skip
+        hint = "is one stopped in the middle of writing there? End it, or choose another output folder"
+        log.fail("MJC424", str(folder), str(error), hint=hint)
     except PermissionError as error:
-        log.fail(
-            ConversionError, "MJC420", str(folder), f"{error.filename or folder} may not be written",
-            hint="choose another output folder, or change its permissions",
-        )  # fmt: skip
+        hint = "choose another output folder, or change its permissions"
+        log.fail("MJC420", str(folder), f"{error.filename or folder} may not be written", hint=hint)
     except OSError as error:
-        log.fail(
-            ConversionError, "MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}",
-            hint="choose another output folder, or make room",
-        )  # fmt: skip
+        hint = "choose another output folder, or make room"
+        log.fail("MJC422", str(folder), f"{folder} cannot be written: {error.strerror or error}", hint=hint)

@@ -9,7 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NoReturn
 
-from .errors import Diagnostic, Env2MjcfError, Severity, Span
+from .errors import (
+    ConversionError,
+    Diagnostic,
+    Env2MjcfError,
+    FormatError,
+    GeometryError,
+    KinematicsError,
+    Severity,
+    Span,
+)
 
 CATALOGUE: dict[str, str] = {
     # Text files that cannot be read: 10x the file, 11x numbers and words, 12x keywords, 13x the kind, 14x XML.
@@ -245,9 +254,27 @@ CATALOGUE: dict[str, str] = {
     "CFG553": "A file that is no path stands where a path would be written; it is kept.",
 }
 
+_CLASSES: dict[str, type[Env2MjcfError]] = {
+    "ENV": FormatError,
+    "GEO": GeometryError,
+    "KIN": KinematicsError,
+    "MJC": ConversionError,
+    "CFG": FormatError,
+}
+# What cannot be expressed, or not be written, although it was read.
+_NOT_EXPRESSED = {*(f"ENV{n}" for n in range(160, 180)), "ENV190", "KIN320"}
+_NOT_WRITTEN = {"CFG509", "CFG532", "CFG542", "CFG552", "CFG553"}
+
+
+def error_class(code: str) -> type[Env2MjcfError]:
+    """Return the class of the error that is raised with a code."""
+    return ConversionError if code in _NOT_EXPRESSED | _NOT_WRITTEN else _CLASSES[code[:3]]
+
 
 class DiagnosticLog:
     """Collects diagnostics; in strict mode the first warning is raised as an error.
+
+    A code tells the class of its error; `info`, `warn` and `fail` say how bad it is.
 
     Args:
         strict: Whether warnings are errors.
@@ -268,33 +295,15 @@ class DiagnosticLog:
         self._items.extend(diagnostics)
 
     def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
-        """Record something worth knowing that is no fault."""
+        """Record something worth knowing that is not a fault."""
         self._items.append(Diagnostic(code, Severity.INFO, subject, message, hint, span))
 
-    def warn(
-        self,
-        kind: type[Env2MjcfError],
-        code: str,
-        subject: str,
-        message: str,
-        *,
-        hint: str = "",
-        span: Span | None = None,
-    ) -> None:
-        """Record something doubtful; raise it as `kind` in strict mode."""
+    def warn(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
+        """Record something doubtful; raise it in strict mode."""
         if self.strict:
-            self.fail(kind, code, subject, message, hint=hint, span=span)
+            self.fail(code, subject, message, hint=hint, span=span)
         self._items.append(Diagnostic(code, Severity.WARNING, subject, message, hint, span))
 
-    def fail(
-        self,
-        kind: type[Env2MjcfError],
-        code: str,
-        subject: str,
-        message: str,
-        *,
-        hint: str = "",
-        span: Span | None = None,
-    ) -> NoReturn:
-        """Raise a fault as `kind`, with everything recorded before it."""
-        raise kind(Diagnostic(code, Severity.ERROR, subject, message, hint, span), tuple(self._items))
+    def fail(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> NoReturn:
+        """Raise a fault, with everything recorded before it."""
+        raise error_class(code)(Diagnostic(code, Severity.ERROR, subject, message, hint, span), self._items)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from .diagnostics import DiagnosticLog
-from .errors import GeometryError, Span
+from .errors import Span
 
 COSTLY = 10
 """Steps that a comparison counts for which clips polygons."""
@@ -68,13 +68,14 @@ def bounded(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None)
         yield
     except TooMuchWorkError:
         log.fail(
-            GeometryError, "GEO273", subject,
+            "GEO273",
+            subject,
             f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its "
             "parts would have to be compared",
             hint="remove parts that overlap, choose collision='hull' (--collision hull), or "
             + Limits.hint("mesh_work"),
             span=span,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from .diagnostics import DiagnosticLog
-from .errors import Diagnostic, GeometryError
+from .errors import Diagnostic
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
 from .kinematics.space import ConfigurationSpace
 from .kinematics.transforms import Array
+from .kinematics.tree import dof_names
 from .limits import Limits
 from .mjcf.checks import refuse_long_chains
 from .mjcf.compiler import Document, compile_mjcf
 from .model.environment import Environment
-from .model.names import dof_names
 from .model.scaling import scaled
 from .options import Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
@@ -75,11 +75,10 @@ def _check_pairs(environment: Environment, options: Options, log: DiagnosticLog)
     links, obstacles = (sum(len(m.bodies) for m in group) for group in (environment.robots, environment.obstacles))
     count, at_most = links * obstacles + links * (links - 1) // 2, options.limits.pairs
     if count > at_most:
-        log.fail(
-            GeometryError, "GEO275", environment.name,
-            f"{links} links and {obstacles} obstacles make {count} pairs of bodies; at most {at_most} are compared",
-            hint=Limits.hint("pairs"),
-        )  # fmt: skip
+        message = (
+            f"{links} links and {obstacles} obstacles make {count} pairs of bodies; at most {at_most} are compared"
+        )
+        log.fail("GEO275", environment.name, message, hint=Limits.hint("pairs"))
 
 
 def recompile(compiled: Compiled, exclude: Sequence[tuple[str, str]], log: DiagnosticLog) -> Compiled:

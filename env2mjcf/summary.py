@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from .diagnostics import DiagnosticLog
-from .errors import FormatError
 from .formats.reading import read
 from .kinematics.forward import RobotKinematics
 from .kinematics.space import ConfigurationSpace
 from .kinematics.transforms import Array
+from .kinematics.tree import dof_names
 from .model.dialects import RULES
 from .model.environment import Boundary, Dialect, Environment, Resolution
-from .model.names import body_names, dof_names
+from .model.names import body_names
 from .model.scaling import scaled
 from .system.files import NoRegularFileError, open_regular
 
@@ -172,10 +172,8 @@ def _begins_as_xml(path: Path) -> bool:
     try:
         file = open_regular(path)
     except NoRegularFileError as error:
-        DiagnosticLog().fail(
-            FormatError, "ENV104", str(path), f"{path} cannot be described: {error.strerror}",
-            hint="save it as a file, which is read twice",
-        )  # fmt: skip
+        hint = "save it as a file, which is read twice"
+        DiagnosticLog().fail("ENV104", str(path), f"{path} cannot be described: {error.strerror}", hint=hint)
     with file:
         return file.read(1024).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")
 

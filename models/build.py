@@ -241,8 +241,7 @@ def tube(path: Points, radius: float, sides: int) -> Mesh:
     rings = [[len(vertices)] * sides, *rings, [len(vertices) + 1] * sides]
     vertices += [path[0], path[-1]]
     return Mesh.of(
-        [v.tolist() for v in vertices],
-        [_strip(a, b, k) for a, b in itertools.pairwise(rings) for k in range(sides)],
+        [v.tolist() for v in vertices], [_strip(a, b, k) for a, b in itertools.pairwise(rings) for k in range(sides)]
     )
 
 

@@ -225,9 +225,7 @@ def test_a_tilted_sheet_is_flat(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "dimension"),
-    [([[0, 0, 0], [1, 2, 3], [2, 4, 6]], 1), ([[1, 1, 1]] * 3, 0)],
-    ids=["line", "point"],
+    ("points", "dimension"), [([[0, 0, 0], [1, 2, 3], [2, 4, 6]], 1), ([[1, 1, 1]] * 3, 0)], ids=["line", "point"]
 )
 def test_a_line_or_a_point_is_refused(points: list[list[float]], dimension: int) -> None:
     mesh = Mesh.from_arrays("m", points, [[0, 1, 2]])

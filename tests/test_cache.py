@@ -219,11 +219,7 @@ class TestFolder:
 
     @pytest.mark.parametrize(
         ("system", "place"),
-        [
-            ("linux", ".cache/env2mjcf"),
-            ("darwin", "Library/Caches/env2mjcf"),
-            ("win32", "AppData/Local/env2mjcf"),
-        ],
+        [("linux", ".cache/env2mjcf"), ("darwin", "Library/Caches/env2mjcf"), ("win32", "AppData/Local/env2mjcf")],
     )
     def test_is_the_platforms(self, system, place, tmp_path, monkeypatch):
         monkeypatch.setattr(sys, "platform", system)

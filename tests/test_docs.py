@@ -104,11 +104,7 @@ def test_the_page_of_diagnostics_lists_every_code() -> None:
 
 def test_a_console_block_is_commands_and_what_they_print() -> None:
     (block,) = blocks("text\n\n```console\n$ echo one \\\n    two\none two\n$ true\n$ seq 3\n1\n...\n```\n")
-    assert list(commands(block)) == [
-        (4, "echo one \\\n    two", "one two"),
-        (7, "true", ""),
-        (8, "seq 3", "1\n..."),
-    ]
+    assert list(commands(block)) == [(4, "echo one \\\n    two", "one two"), (7, "true", ""), (8, "seq 3", "1\n...")]
 
 
 @pytest.mark.parametrize(

@@ -41,11 +41,7 @@ VERBS = {
     "batch": (["batch", "scene.env", "q.npy", "-o"], "v.npy", "CFG509"),
     "render": (["render", "scene.env", "--size", "160x120", "-o"], "a.png", "CFG552"),
     "play mp4": (["play", "scene.env", "a.path", "--fps", "4", "--size", "160x120", "-o"], "a.mp4", "CFG552"),
-    "play gif": (
-        ["play", "scene.env", "a.path", "--fps", "4", "--size", "160x120", "-o"],
-        "a.gif",
-        "CFG552",
-    ),
+    "play gif": (["play", "scene.env", "a.path", "--fps", "4", "--size", "160x120", "-o"], "a.gif", "CFG552"),
     "plan": (["plan", "scene.env", "--query", "a.query", "--planner", "BatchEST", "-o"], "b.path", "CFG5[34]2"),
     "translate": (["translate", "scene.env", "--dialect", "E", "--query", "a.query", "-o"], "b.env", "ENV179"),
     "check": (["check", "scene.env", "a.path", "--picture"], "a.png", "CFG552"),

@@ -446,10 +446,7 @@ def test_a_wrong_count_is_a_warning_and_the_file_is_believed(read: Reader, old: 
     scene = read(text)
     (warning,) = warnings(scene)
     assert (warning.code, warning.message) == ("ENV203", what)
-    assert (warning.span and warning.span.line, warning.span and warning.span.column) == (
-        place(text, new)[0] + 1,
-        1,
-    )
+    assert (warning.span and warning.span.line, warning.span and warning.span.column) == (place(text, new)[0] + 1, 1)
     assert scene.multibodies == read(D).multibodies
 
 

@@ -196,15 +196,7 @@ PROBLEM = """<?xml version="1.0"?>
 </MotionPlanning>
 """
 
-ENV_TEXTS = {
-    "A": LEGACY,
-    "A-fixed": LEGACY_FIXED,
-    "B": B,
-    "C": C,
-    "D": D,
-    "D-nonholonomic": NON_HOLONOMIC,
-    "E": E,
-}
+ENV_TEXTS = {"A": LEGACY, "A-fixed": LEGACY_FIXED, "B": B, "C": C, "D": D, "D-nonholonomic": NON_HOLONOMIC, "E": E}
 
 Reader = Callable[..., Environment]
 

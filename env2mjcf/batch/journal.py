@@ -30,7 +30,6 @@ from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError
 from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock, unlock
 
 _FORMAT = "env2mjcf batch 1"
@@ -262,7 +261,7 @@ class Partial:
         self._stop(reason, "choose another output, or make room")
 
     def _stop(self, message: str, hint: str) -> NoReturn:
-        DiagnosticLog().fail(ConversionError, "CFG509", str(self._output), message, hint=hint)
+        DiagnosticLog().fail("CFG509", str(self._output), message, hint=hint)
 
 
 def _progress(journal: bytes) -> Progress | None:

@@ -54,12 +54,7 @@ class Convert:
         print_diagnostics(result.diagnostics, self.output.verbose)
         if self.output.json:
             print_json(
-                {
-                    "xml": result.xml,
-                    "assets": result.assets,
-                    "report": result.report,
-                    "diagnostics": result.diagnostics,
-                }
+                {"xml": result.xml, "assets": result.assets, "report": result.report, "diagnostics": result.diagnostics}
             )
         else:
             path = os.fspath(result.xml)

@@ -15,7 +15,6 @@ from tyro.conf import Positional
 
 from ..companions.configurations import refuse_without_freedom
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..formats.path import begins_as_path
 from ..options import Options, PathArgument
 from ..system.files import refuse_foreign, refuse_unwritable
@@ -125,19 +124,15 @@ class Plan:
         refuse_without_freedom(scene, self.scene, log)
         tasks = scene.queries
         if not tasks:
-            log.fail(
-                FormatError, "CFG540", self.scene, "there is no task: no start, and no goal",
-                hint="give a query file: --query FILE",
-            )  # fmt: skip
+            hint = "give a query file: --query FILE"
+            log.fail("CFG540", self.scene, "there is no task: no start, and no goal", hint=hint)
         if not 1 <= self.task <= len(tasks):
             count = "there is 1 task" if len(tasks) == 1 else f"there are {len(tasks)} tasks"
             raise ValueError(f"--task is {self.task}: {count}, counted from 1")
         task = tasks[self.task - 1]
         if len(task.q) < 2:
-            log.fail(
-                FormatError, "CFG541", self.scene, "the task holds one configuration; expected a start and a goal",
-                hint="add the goal to the query file",
-            )  # fmt: skip
+            hint = "add the goal to the query file"
+            log.fail("CFG541", self.scene, "the task holds one configuration; expected a start and a goal", hint=hint)
         return task
 
     def _write(self, scene: Scene, robot: int, result: Result) -> Path | None:

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..kinematics.space import ConfigurationSpace
 from ..kinematics.transforms import Array
 from ..limits import LARGEST
@@ -73,16 +72,14 @@ def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Sourc
     log, hint = DiagnosticLog(), _WHAT_TO_DO.format(dim=space.dim)
     if not Path(path).is_file():
         what = "is a folder" if Path(path).is_dir() else "does not exist"
-        log.fail(FormatError, "CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
+        log.fail("CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
     rows = map_array(path, log, hint)
     if rows.ndim != 2 or rows.shape[1] != space.dim:
         names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
         if rows.shape == (space.dim,):
             hint = "one configuration is array.reshape(1, -1)"
-        log.fail(
-            FormatError, "CFG505", path,
-            f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {names}", hint=hint,
-        )  # fmt: skip
+        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {names}"
+        log.fail("CFG505", path, message, hint=hint)
     return Source(path, rows, space, file_units)
 
 
@@ -110,10 +107,10 @@ def map_array(path: str, log: DiagnosticLog, hint: str = "") -> NDArray[Any]:
         array: Any = None if dtype.kind not in "fiu" else np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # NumPy's reader raises whatever it stumbles over
         why = str(error)[:200] or type(error).__name__
-        log.fail(FormatError, "CFG505", path, f"{path} is no NumPy file (.npy), or cut off: {why}", hint=hint)
+        log.fail("CFG505", path, f"{path} is no NumPy file (.npy), or cut off: {why}", hint=hint)
     if array is None:
         found = f"{dtype} values in an array of shape {shape}"
-        log.fail(FormatError, "CFG505", path, f"{path} holds {found}; expected floats", hint=hint)
+        log.fail("CFG505", path, f"{path} holds {found}; expected floats", hint=hint)
     return array
 
 
@@ -139,12 +136,11 @@ def coordinates(
     if not good.all():
         row, column = (int(i) for i in np.argwhere(~good)[0])
         name = names[column] if len(names) == rows.shape[1] else f"number {column + 1}"
-        log.fail(
-            FormatError, "CFG505", path,
+        message = (
             f"row {first + row} of {path}: {name} is {rows[row, column]}; "
-            f"expected a finite number, not larger than {LARGEST:g}",
-            hint=hint,
-        )  # fmt: skip
+            f"expected a finite number, not larger than {LARGEST:g}"
+        )
+        log.fail("CFG505", path, message, hint=hint)
     return values
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..formats.path import is_path
 from ..formats.roadmap import is_roadmap
 from ..formats.rows import read_query
@@ -65,10 +64,8 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
     refuse_without_freedom(scene, scene.environment.path, log)
     found = _of_file(scene, path, radians, limits, log)
     if not found.labels:
-        log.fail(
-            FormatError, "CFG503", path, f"{path} holds no configuration; expected one at least",
-            hint="has what wrote it found nothing?",
-        )  # fmt: skip
+        hint = "has what wrote it found nothing?"
+        log.fail("CFG503", path, f"{path} holds no configuration; expected one at least", hint=hint)
     return found
 
 
@@ -80,10 +77,8 @@ def refuse_without_freedom(scene: Scene, path: str, log: DiagnosticLog) -> None:
     """
     if not scene.space.dim:
         what = "has no robot" if not scene.environment.robots else "has no robot that moves"
-        log.fail(
-            FormatError, "CFG543", path, f"{path} {what}: there are no configurations of it",
-            hint="is a robot file missing? Give it with --robots FILE",
-        )  # fmt: skip
+        hint = "is a robot file missing? Give it with --robots FILE"
+        log.fail("CFG543", path, f"{path} {what}: there are no configurations of it", hint=hint)
 
 
 def _of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: DiagnosticLog) -> Configurations:

@@ -42,11 +42,11 @@ def ways_between(scene: Scene, roadmap: Roadmap, log: DiagnosticLog) -> tuple[Ar
         else:
             between[edge] = _rotating_at(scene, roadmap, edge, fraction)
     for name, count in unknown.items():
-        log.info(
-            "CFG534", roadmap.file,
+        message = (
             f"{count} edge{'' if count == 1 else 's'} made by the local planner '{name}', which may have left the "
-            "straight way; checked as straight",
-        )  # fmt: skip
+            "straight way; checked as straight"
+        )
+        log.info("CFG534", roadmap.file, message)
     return tuple(between)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic, FormatError
+from ..errors import Diagnostic
 from ..formats import path as text
 from ..formats.source import Source, read_source
 from ..kinematics.inverse import configuration_of_poses, pose_gaps
@@ -154,10 +154,9 @@ def _report_misfits(
     if fits.all():
         return
     worst, first = float(errors.max()), int(np.argmin(fits))
-    log.warn(
-        FormatError, "CFG518", source.path,
+    message = (
         f"{int((~fits).sum())} of {len(fits)} recorded poses belong to no configuration of the robot: links are up to "
-        f"{worst:.3g} m away from where they should be",
-        hint="is it the path of another robot? Links are checked where the file has them",
-        span=source.line_span(found.lines[first]),
-    )  # fmt: skip
+        f"{worst:.3g} m away from where they should be"
+    )
+    hint = "is it the path of another robot? Links are checked where the file has them"
+    log.warn("CFG518", source.path, message, hint=hint, span=source.line_span(found.lines[first]))

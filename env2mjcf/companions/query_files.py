@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..formats import rows as text
 from ..formats.path import ALL_ROBOTS
 from ..formats.source import read_source
@@ -101,11 +101,8 @@ def out_of_turns(
     """
     if scene.environment.dialect is Dialect.A or not rows:
         return list(rows)
-    log.warn(
-        FormatError, "CFG535", file,
-        "a file of this version counts angles in turns, the scene's dialect in fractions of pi; read as turns",
-        hint="is it the file of an older version of the scene?", span=span,
-    )  # fmt: skip
+    message = "a file of this version counts angles in turns, the scene's dialect in fractions of pi; read as turns"
+    log.warn("CFG535", file, message, hint="is it the file of an older version of the scene?", span=span)
     robots = scene.compiled.assembly.robots
     factors = {i: [1.0 if d.kind.is_length else 2.0 for d in r.kinematics.dofs] for i, r in enumerate(robots)}
     factors[ALL_ROBOTS] = [f for i in range(len(robots)) for f in factors[i]]

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..formats.rows import check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
 from ..kinematics.transforms import Array
@@ -122,7 +121,7 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     rows = np.atleast_2d(array)
     if rows.ndim != 2 or not rows.size:
         what = f"an array of shape {array.shape}"
-        log.fail(FormatError, "CFG505", path, f"{path} holds {what}; expected rows of {expected(scene)}")
+        log.fail("CFG505", path, f"{path} holds {what}; expected rows of {expected(scene)}")
     rows = coordinates(rows, path, log, names=scene.space.names)
     if rows.shape[1] == scene.space.dim:
         q = rows if radians else scene.space.decode(rows)
@@ -131,7 +130,7 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     for i, numbers in enumerate(rows.tolist()):
         row = row_of(scene, numbers, radians)
         if row is None:
-            log.fail(FormatError, "CFG504", path, f"row {i} has {len(numbers)} numbers; expected {expected(scene)}")
+            log.fail("CFG504", path, f"row {i} has {len(numbers)} numbers; expected {expected(scene)}")
         found.append((f"row {i}", row))
     return joined(scene, found)
 
@@ -150,23 +149,20 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
             continue  # names of columns
         wrong = next((w for w, x in zip(words, numbers, strict=True) if x is None), None)
         if wrong is not None:
+            message = f"expected a row of finite numbers, found {wrong.group()[:60]!r}"
+            hint = coordinate_hint(wrong.group())
             log.fail(
-                FormatError, "CFG502", source.path, f"expected a row of finite numbers, found {wrong.group()[:60]!r}",
-                hint=coordinate_hint(wrong.group()), span=source.span(start + wrong.start(), start + wrong.end()),
-            )  # fmt: skip
+                "CFG502", source.path, message, hint=hint, span=source.span(start + wrong.start(), start + wrong.end())
+            )
         row = row_of(scene, [x for x in numbers if x is not None], radians)
         if row is None:
-            log.fail(
-                FormatError, "CFG504", source.path, f"a row of {len(words)} numbers; expected {expected(scene)}",
-                span=source.line_span(line),
-            )  # fmt: skip
+            message = f"a row of {len(words)} numbers; expected {expected(scene)}"
+            log.fail("CFG504", source.path, message, span=source.line_span(line))
         found.append((f"line {line}", row))
         check_rows(source, len(found), log, source.line_span(line))
     if not found:
-        log.fail(
-            FormatError, "CFG503", source.path, f"{source.path} holds no configuration; expected rows of numbers",
-            span=source.line_span(1),
-        )  # fmt: skip
+        message = f"{source.path} holds no configuration; expected rows of numbers"
+        log.fail("CFG503", source.path, message, span=source.line_span(1))
     return joined(scene, found)
 
 

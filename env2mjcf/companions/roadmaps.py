@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic, FormatError
+from ..errors import Diagnostic
 from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
 from ..formats.source import Source, read_source
@@ -288,7 +288,5 @@ def _report(source: Source, findings: dict[str, list[Node]], log: DiagnosticLog)
             what, hint = _WHAT[code]
             many = "" if len(nodes) == 1 else "s"
             first = f", the first at node {nodes[0].vid}"
-            log.warn(
-                FormatError, code, source.path, f"{len(nodes)} {what.format(many)}{first}", hint=hint,
-                span=source.line_span(nodes[0].line),
-            )  # fmt: skip
+            message = f"{len(nodes)} {what.format(many)}{first}"
+            log.warn(code, source.path, message, hint=hint, span=source.line_span(nodes[0].line))

@@ -52,12 +52,7 @@ class Manifolds:
     """
 
     def __init__(
-        self,
-        pairs: Sequence[Pair],
-        parts: Mapping[str, Part],
-        surfaces: Surfaces,
-        clearance: Clearance,
-        extent: float,
+        self, pairs: Sequence[Pair], parts: Mapping[str, Part], surfaces: Surfaces, clearance: Clearance, extent: float
     ) -> None:
         self._pairs = pairs
         self._surfaces = surfaces

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..limits import LARGEST, Limits
 from ..model.dialects import RULES, DialectRules
 from ..model.environment import (
@@ -71,11 +71,8 @@ def read_dh(scan: Scanner, grammar: Grammar) -> DHParameters:
     span = scan.span(start)
     unit = grammar.rules.dh_angle
     if unit == 1.0 and max(abs(alpha), abs(theta)) > _SUSPICIOUS_RADIANS:
-        scan.log.warn(
-            FormatError, "ENV303", "DH parameters",
-            f"alpha {alpha:g} and theta {theta:g} are read as radians in dialect {grammar.dialect}",
-            hint="only dialect A has degrees here", span=span,
-        )  # fmt: skip
+        message = f"alpha {alpha:g} and theta {theta:g} are read as radians in dialect {grammar.dialect}"
+        scan.log.warn("ENV303", "DH parameters", message, hint="only dialect A has degrees here", span=span)
     return DHParameters(alpha * unit, a, d, theta * unit, span)
 
 
@@ -84,10 +81,8 @@ def read_color(scan: Scanner) -> tuple[float, float, float, float]:
     start = scan.position
     r, g, b, a = scan.numbers("red green blue alpha")
     if not all(0 <= c <= 1 for c in (r, g, b, a)):
-        scan.log.warn(
-            FormatError, "ENV215", "color", f"colour {r:g} {g:g} {b:g} {a:g}; expected four numbers from 0 to 1",
-            hint="divide by 255 where they are bytes", span=scan.span(start),
-        )  # fmt: skip
+        message = f"colour {r:g} {g:g} {b:g} {a:g}; expected four numbers from 0 to 1"
+        scan.log.warn("ENV215", "color", message, hint="divide by 255 where they are bytes", span=scan.span(start))
     return r, g, b, a
 
 
@@ -96,10 +91,9 @@ def read_coordinate(scan: Scanner, what: str) -> float:
     start = scan.position
     value = scan.number(what)
     if abs(value) > LARGEST:
-        scan.fail(
-            "ENV183", f"{what} is {value:g}; at most {LARGEST:g} can be computed with",
-            hint="is the file damaged? What has no end is wide enough with 1e6", span=scan.span(start),
-        )  # fmt: skip
+        message = f"{what} is {value:g}; at most {LARGEST:g} can be computed with"
+        hint = "is the file damaged? What has no end is wide enough with 1e6"
+        scan.fail("ENV183", message, hint=hint, span=scan.span(start))
     return value
 
 
@@ -110,10 +104,8 @@ def read_range(scan: Scanner, what: str) -> tuple[float, float]:
     scan.punctuation(":", f"between the two ends of {what}")
     upper = read_coordinate(scan, f"upper end of {what}")
     if lower > upper:
-        scan.fail(
-            "ENV114", f"{what} {lower:g}:{upper:g} is empty; expected lower:upper",
-            hint=f"write {upper:g}:{lower:g}", span=scan.span(start),
-        )  # fmt: skip
+        message = f"{what} {lower:g}:{upper:g} is empty; expected lower:upper"
+        scan.fail("ENV114", message, hint=f"write {upper:g}:{lower:g}", span=scan.span(start))
     return lower, upper
 
 
@@ -145,11 +137,8 @@ def check_count(scan: Scanner, declared: int, found: int, what: str, span: Span)
 def warn_of_count(scan: Scanner, declared: int, found: int, what: str, span: Span) -> None:
     """Warn that a file declares another number of things than it has."""
     plural = _plural(what)
-    scan.log.warn(
-        FormatError, "ENV203", plural,
-        f"the file declares {declared} {what if declared == 1 else plural} and has {found}; read {found}",
-        hint=f"write {found}", span=span,
-    )  # fmt: skip
+    message = f"the file declares {declared} {what if declared == 1 else plural} and has {found}; read {found}"
+    scan.log.warn("ENV203", plural, message, hint=f"write {found}", span=span)
 
 
 def check_limit(scan: Scanner, found: int, at_most: int, what: str, limit: str) -> None:
@@ -173,10 +162,8 @@ def with_directives(scan: Scanner, body: Body, comments: Sequence[Comment]) -> B
 def _directive_color(scan: Scanner, comment: Comment, words: Sequence[str]) -> tuple[float, float, float, float] | None:
     rgb = [c for w in words if (c := parse_number(w)) is not None and 0 <= c <= 1]
     if len(rgb) != 3:
-        scan.log.warn(
-            FormatError, "ENV215", "#VIZMO_COLOR", "a colour that is not used; expected three numbers from 0 to 1",
-            hint="write #VIZMO_COLOR red green blue", span=comment.span,
-        )  # fmt: skip
+        message = "a colour that is not used; expected three numbers from 0 to 1"
+        scan.log.warn("ENV215", "#VIZMO_COLOR", message, hint="write #VIZMO_COLOR red green blue", span=comment.span)
         return None
     return rgb[0], rgb[1], rgb[2], 1.0
 
@@ -200,10 +187,8 @@ def read_boundary(scan: Scanner) -> Boundary:
     if scan.peek() == "[":
         # The newest planner's own writer leaves the word out (env-format section 8.1).
         shape = BoundaryShape.BOX
-        scan.log.warn(
-            FormatError, "ENV206", "Boundary", "a boundary without a shape; read as Box", hint="write Boundary Box [",
-            span=scan.span(),
-        )  # fmt: skip
+        hint = "write Boundary Box ["
+        scan.log.warn("ENV206", "Boundary", "a boundary without a shape; read as Box", hint=hint, span=scan.span())
         return read_extent(scan, shape, scan.span())
     shape = scan.keyword(SHAPES, "boundary shape", code="ENV125")
     return read_extent(scan, shape, scan.span(start))
@@ -228,14 +213,10 @@ def _read_box(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) -
             scan.punctuation(";", "between two ranges")
         ranges.append(read_range(scan, f"the {_AXES[len(ranges)]} range of the boundary"))
     if len(ranges) < 2:
-        scan.fail(
-            "ENV119", "a box with one range; expected two or three (x, y and perhaps z)",
-            hint="write lower:upper for each axis", span=span,
-        )  # fmt: skip
+        hint = "write lower:upper for each axis"
+        scan.fail("ENV119", "a box with one range; expected two or three (x, y and perhaps z)", hint=hint, span=span)
     if shape is BoundaryShape.BOX2D and len(ranges) == 3:
-        scan.log.warn(
-            FormatError, "ENV207", "Boundary", "Box2D with three ranges; all are used", hint="write Box", span=span
-        )
+        scan.log.warn("ENV207", "Boundary", "Box2D with three ranges; all are used", hint="write Box", span=span)
     if shape is BoundaryShape.BOX and len(ranges) == 2:
         scan.log.info("ENV302", "Boundary", "a Box with two ranges leaves z unbounded", span=span)
     return Boundary(shape, lower=tuple(r[0] for r in ranges), upper=tuple(r[1] for r in ranges), span=span)
@@ -257,8 +238,6 @@ def _read_ball(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) 
     at = scan.position
     radius = read_coordinate(scan, "radius")
     if radius <= 0:
-        scan.fail(
-            "ENV119", f"radius {radius:g}; expected a positive number", hint="write the radius behind the centre",
-            span=scan.span(at),
-        )  # fmt: skip
+        hint = "write the radius behind the centre"
+        scan.fail("ENV119", f"radius {radius:g}; expected a positive number", hint=hint, span=scan.span(at))
     return Boundary(shape, center=tuple(center), radius=radius, span=span)

@@ -9,7 +9,7 @@ import re
 from dataclasses import replace
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..model.environment import (
     BaseKind,
     Body,
@@ -65,10 +65,8 @@ def _with_pose(scan: Scanner, grammar: Grammar, filename: Token) -> Body:
         start = scan.position
         base, pose = _read_base(scan, grammar)
         if base is not BaseKind.FIXED:
-            scan.fail(
-                "ENV123", f"an obstacle with a {base.value} base; expected Fixed or a pose",
-                hint="robots have files of their own", span=scan.span(start),
-            )  # fmt: skip
+            message = f"an obstacle with a {base.value} base; expected Fixed or a pose"
+            scan.fail("ENV123", message, hint="robots have files of their own", span=scan.span(start))
     else:
         pose = read_pose(scan, grammar)
     return with_directives(scan, replace(body, pose=pose), comments)
@@ -86,10 +84,9 @@ def _read_mesh(scan: Scanner, grammar: Grammar, filename: Token) -> Body:
 
 def _read_option(scan: Scanner, body: Body, letter: str, start: int) -> Body:
     if letter not in "act":
-        scan.fail(
-            "ENV124", f"unknown body option -{letter}; expected -a(...), -c(...) or -t(...)",
-            hint="write -a for the adjustment, -c for the colour, -t for the texture", span=scan.span(start),
-        )  # fmt: skip
+        message = f"unknown body option -{letter}; expected -a(...), -c(...) or -t(...)"
+        hint = "write -a for the adjustment, -c for the colour, -t for the texture"
+        scan.fail("ENV124", message, hint=hint, span=scan.span(start))
     scan.punctuation("(", f"after -{letter}")
     if letter == "c":
         body = replace(body, color=read_color(scan))
@@ -104,10 +101,8 @@ def _read_option(scan: Scanner, body: Body, letter: str, start: int) -> Body:
         elif text.lower() in _ADJUSTMENTS:
             body = replace(body, recentring=_ADJUSTMENTS[text.lower()])
         else:
-            scan.fail(
-                "ENV124", f"unknown adjustment {text!r}; expected COM, Surface or None",
-                hint="write -a(COM), -a(Surface) or -a(None)", span=scan.span(start),
-            )  # fmt: skip
+            message = f"unknown adjustment {text!r}; expected COM, Surface or None"
+            scan.fail("ENV124", message, hint="write -a(COM), -a(Surface) or -a(None)", span=scan.span(start))
     scan.punctuation(")", f"at the end of -{letter}(...)")
     return body
 
@@ -116,10 +111,8 @@ def _read_mass(scan: Scanner) -> float:
     start = scan.position
     mass = scan.number("mass")
     if mass <= 0:
-        scan.fail(
-            "ENV118", f"mass {mass:g}; expected a positive number",
-            hint="leave it out to have it computed from the density", span=scan.span(start),
-        )  # fmt: skip
+        hint = "leave it out to have it computed from the density"
+        scan.fail("ENV118", f"mass {mass:g}; expected a positive number", hint=hint, span=scan.span(start))
     return mass
 
 
@@ -189,11 +182,8 @@ def read_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> JointLimit
     if joint is JointType.PRISMATIC:
         return JointLimits(lower, upper, span)
     if max(abs(lower), abs(upper)) > _SUSPICIOUS_LIMIT:
-        scan.log.warn(
-            FormatError, "ENV305", joint.value,
-            f"limits {lower:g}:{upper:g} are fractions of pi, here more than a whole turn either way",
-            hint="write -1:1 for a whole turn", span=span,
-        )  # fmt: skip
+        message = f"limits {lower:g}:{upper:g} are fractions of pi, here more than a whole turn either way"
+        scan.log.warn("ENV305", joint.value, message, hint="write -1:1 for a whole turn", span=span)
     unit = grammar.rules.configuration_angle
     return JointLimits(lower * unit, upper * unit, span)
 
@@ -203,23 +193,20 @@ def read_body_index(scan: Scanner, bodies: int) -> int:
     start = scan.position
     index = scan.integer("the index of a body")
     if not 0 <= index < bodies:
-        scan.fail(
-            "ENV115",
-            f"body index {index} is out of range; this multibody has {bodies} bodies, 0 to {bodies - 1}",
-            hint="bodies are counted from 0 in the order of the file", span=scan.span(start),
-        )  # fmt: skip
+        message = f"body index {index} is out of range; this multibody has {bodies} bodies, 0 to {bodies - 1}"
+        scan.fail("ENV115", message, hint="bodies are counted from 0 in the order of the file", span=scan.span(start))
     return index
 
 
 def warn_of_no_limits(log: DiagnosticLog, grammar: Grammar, joint: JointType, span: Span) -> None:
     """Warn that a joint has no limits in a dialect that demands them."""
     unbounded = joint is JointType.PRISMATIC
-    log.warn(
-        FormatError, "ENV204", joint.value,
+    message = (
         f"{joint.value} without limits in dialect {grammar.dialect}; expected min:max, read as "
-        f"{'unbounded' if unbounded else '-1:1'}",
-        hint="write the limits behind the joint type" if unbounded else "write -1:1", span=span,
-    )  # fmt: skip
+        f"{'unbounded' if unbounded else '-1:1'}"
+    )
+    hint = "write the limits behind the joint type" if unbounded else "write -1:1"
+    log.warn("ENV204", joint.value, message, hint=hint, span=span)
 
 
 def _read_connection_tag(scan: Scanner, grammar: Grammar) -> None:
@@ -229,17 +216,13 @@ def _read_connection_tag(scan: Scanner, grammar: Grammar) -> None:
     if tag is None and not grammar.rules.plural_connections and word.isalpha() and not is_multibody_tag(word):
         # The readers of A, B and early C take any word here.
         scan.word("a tag")
-        scan.log.warn(
-            FormatError, "ENV202", word, f"{word!r} stands where 'Connections' was expected", hint="write Connections",
-            span=scan.span(start),
-        )  # fmt: skip
+        message = f"{word!r} stands where 'Connections' was expected"
+        scan.log.warn("ENV202", word, message, hint="write Connections", span=scan.span(start))
         return
     tag = scan.keyword({t: t for t in _CONNECTION_TAGS}, "tag")
     if tag == "Connection" and grammar.rules.plural_connections:
-        scan.log.warn(
-            FormatError, "ENV205", tag, f"dialect {grammar.dialect} spells this tag 'Connections'",
-            hint="write Connections", span=scan.span(start),
-        )  # fmt: skip
+        message = f"dialect {grammar.dialect} spells this tag 'Connections'"
+        scan.log.warn("ENV205", tag, message, hint="write Connections", span=scan.span(start))
 
 
 def _read_joint(scan: Scanner, grammar: Grammar) -> JointType:
@@ -249,13 +232,13 @@ def _read_joint(scan: Scanner, grammar: Grammar) -> JointType:
         _LEGACY_JOINTS if legacy else _LATER_JOINTS, "joint type", code="ENV121", exact_case=grammar.rules.keyword_case
     )
     if joint is JointType.PRISMATIC:
-        scan.log.info(
-            "ENV304", "Prismatic",
+        message = (
             "a Prismatic connection slides along the DH z axis, its value replacing d; "
             "the original planner turned it by theta instead"
-            if legacy else "Prismatic is not a joint type of the original planner in this dialect; read as a slide",
-            span=scan.span(start),
-        )  # fmt: skip
+            if legacy
+            else "Prismatic is not a joint type of the original planner in this dialect; read as a slide"
+        )
+        scan.log.info("ENV304", "Prismatic", message, span=scan.span(start))
     return joint
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span, did_you_mean
+from ..errors import Span, did_you_mean
 from ..model.environment import Dialect
 from .lexer import misspelling
 from .source import Source
@@ -43,10 +43,8 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
     text = _COMMENT.sub("", source.text)
     first, second = _first_words(text)
     if not first:
-        log.fail(
-            FormatError, "ENV130", source.path, f"{source.path} is empty; expected an environment",
-            hint="was it saved?", span=source.span(0),
-        )  # fmt: skip
+        message = f"{source.path} is empty; expected an environment"
+        log.fail("ENV130", source.path, message, hint="was it saved?", span=source.span(0))
     if _means(first, ("Boundary",)):
         return _with_boundary(text)
     if _COUNT.fullmatch(first):
@@ -55,22 +53,17 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
         if _means(second, _LATER_TAGS):
             return Dialect.C if _LIMITS.search(text) else Dialect.B
         if "." in second:
-            log.fail(
-                FormatError, "ENV131", source.path,
-                f"{source.path} is a robot file, not an environment: a mesh file follows its count",
-                hint="read the environment, and give this file as robots=[...] (--robots)",
-                span=_place(source, second),
-            )  # fmt: skip
+            message = f"{source.path} is a robot file, not an environment: a mesh file follows its count"
+            hint = "read the environment, and give this file as robots=[...] (--robots)"
+            log.fail("ENV131", source.path, message, hint=hint, span=_place(source, second))
         expected = "'MultiBody', 'Active', 'Passive', 'Internal' or 'Surface' behind the number of multibodies"
         wrong = second or first
     else:
         expected = "a number of multibodies, 'Boundary' or XML"
         wrong = first
-    log.fail(
-        FormatError, "ENV130", source.path,
-        f"{source.path} is no environment: found {wrong[:40]!r}; expected {expected}",
-        hint="name an environment, or choose its dialect with dialect= (--dialect)", span=_place(source, wrong),
-    )  # fmt: skip
+    message = f"{source.path} is no environment: found {wrong[:40]!r}; expected {expected}"
+    hint = "name an environment, or choose its dialect with dialect= (--dialect)"
+    log.fail("ENV130", source.path, message, hint=hint, span=_place(source, wrong))
 
 
 def _first_words(text: str) -> tuple[str, str]:

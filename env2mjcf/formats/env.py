@@ -10,7 +10,6 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import FormatError
 from ..model.environment import Boundary, Dialect, Environment, MultiBody, Resolution
 from .blocks import Grammar, check_limit, is_multibody_tag, read_boundary, warn_of_count
 from .lexer import Scanner
@@ -64,17 +63,13 @@ def _check_header(scan: Scanner) -> None:
         words = comment.text.lstrip("#").split()
         if len(words) >= 3 and words[0] == "Environment" and "Version" in words[1]:
             if words[2] not in _ENVIRONMENT_VERSIONS:
-                scan.log.warn(
-                    FormatError, "ENV208", "header",
-                    f"unknown environment version {words[2]!r}; expected 0, 20001022 or 20020327",
-                    hint="the original reader stops here; this one goes on", span=comment.span,
-                )  # fmt: skip
+                message = f"unknown environment version {words[2]!r}; expected 0, 20001022 or 20020327"
+                hint = "the original reader stops here; this one goes on"
+                scan.log.warn("ENV208", "header", message, hint=hint, span=comment.span)
         elif words and words[0].lower().startswith("cfg_") and words[0].lower() not in _CONFIGURATION_CLASSES:
-            scan.log.warn(
-                FormatError, "ENV218", "header",
-                f"configurations of class {words[0]} have a layout of their own; read as base, then joints",
-                hint="compare the names of the degrees of freedom with the query", span=comment.span,
-            )  # fmt: skip
+            message = f"configurations of class {words[0]} have a layout of their own; read as base, then joints"
+            hint = "compare the names of the degrees of freedom with the query"
+            scan.log.warn("ENV218", "header", message, hint=hint, span=comment.span)
 
 
 def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
@@ -117,10 +112,8 @@ def _read_multibodies(scan: Scanner, grammar: Grammar) -> tuple[tuple[MultiBody,
 
 
 def _ignore_rest(scan: Scanner) -> None:
-    scan.log.warn(
-        FormatError, "ENV209", scan.source.path, "text behind the last multibody is not used",
-        hint="begin comment lines with '#'", span=scan.span(),
-    )  # fmt: skip
+    hint = "begin comment lines with '#'"
+    scan.log.warn("ENV209", scan.source.path, "text behind the last multibody is not used", hint=hint, span=scan.span())
     scan.advance(len(scan.source.text))
 
 
@@ -132,7 +125,7 @@ def _check_ending(scan: Scanner, grammar: Grammar) -> None:
         span = scan.source.span(len(text) - 1)
         if grammar.rules.needs_final_newline:
             message += ": the original reader fails here"
-            scan.log.warn(FormatError, "ENV210", scan.source.path, message, hint=hint, span=span)
+            scan.log.warn("ENV210", scan.source.path, message, hint=hint, span=span)
         else:
             scan.log.info("ENV210", scan.source.path, message, hint=hint, span=span)
 
@@ -149,24 +142,19 @@ def read_robot(scan: Scanner) -> MultiBody:
     _refuse_environment(scan)
     if scan.peek_word().lower() == "active":
         # Some robot files begin with the tag that a multibody has.
-        scan.log.warn(
-            FormatError, "ENV211", "Active", "a robot file begins with its body count, not with a tag",
-            hint="remove the tag", span=scan.span(),
-        )  # fmt: skip
+        message = "a robot file begins with its body count, not with a tag"
+        scan.log.warn("ENV211", "Active", message, hint="remove the tag", span=scan.span())
         scan.word("Active")
     robot = read_robot_bodies(scan, Grammar.of(Dialect.E))
     if not scan.at_end():
-        scan.log.warn(
-            FormatError, "ENV209", scan.source.path, "text behind the last connection is not used",
-            hint="begin comment lines with '#'", span=scan.span(),
-        )  # fmt: skip
+        message = "text behind the last connection is not used"
+        scan.log.warn("ENV209", scan.source.path, message, hint="begin comment lines with '#'", span=scan.span())
     return replace(robot, robot_file=scan.source.path)
 
 
 def _refuse_environment(scan: Scanner) -> None:
     behind_count = scan.next_matches(_COUNT_AND_WORD)
     if scan.peek_word().lower() == "boundary" or (behind_count and is_multibody_tag(behind_count.group(1))):
-        scan.fail(
-            "ENV133", f"{scan.source.path} is an environment, not a robot file; expected a number of bodies",
-            hint="robots= (--robots) takes dialect E robot files; an environment brings its own robots",
-        )  # fmt: skip
+        message = f"{scan.source.path} is an environment, not a robot file; expected a number of bodies"
+        hint = "robots= (--robots) takes dialect E robot files; an environment brings its own robots"
+        scan.fail("ENV133", message, hint=hint)

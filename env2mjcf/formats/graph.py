@@ -9,7 +9,6 @@ from enum import StrEnum
 from typing import NoReturn
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from .lexer import parse_integer
 from .rows import check_rows, coordinate, coordinate_hint
 from .source import Source
@@ -276,15 +275,14 @@ def _fail(
 ) -> NoReturn:
     expected = " or ".join(f"{d} (robot {i})" for i, d in enumerate(dofs)) or "none"
     if misfit.at >= len(words):
-        log.fail(
-            FormatError, "CFG522", source.path,
-            f"the nodes end where {misfit.expected} was expected; robots have so many degrees of freedom: {expected}",
-            hint="is the file cut off, or the roadmap of another scene?", span=source.span(max(0, end - 1)),
-        )  # fmt: skip
+        message = (
+            f"the nodes end where {misfit.expected} was expected; robots have so many degrees of freedom: {expected}"
+        )
+        hint = "is the file cut off, or the roadmap of another scene?"
+        log.fail("CFG522", source.path, message, hint=hint, span=source.span(max(0, end - 1)))
     word = words[misfit.at]
-    log.fail(
-        FormatError, "CFG529", source.path,
-        f"expected {misfit.expected}, found {word.text[:60]!r}; robots have so many degrees of freedom: {expected}",
-        hint=coordinate_hint(word.text) or "is it the roadmap of another scene?",
-        span=source.span(word.start, word.start + len(word.text)),
-    )  # fmt: skip
+    message = (
+        f"expected {misfit.expected}, found {word.text[:60]!r}; robots have so many degrees of freedom: {expected}"
+    )
+    hint = coordinate_hint(word.text) or "is it the roadmap of another scene?"
+    log.fail("CFG529", source.path, message, hint=hint, span=source.span(word.start, word.start + len(word.text)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span, did_you_mean
+from ..errors import Span, did_you_mean
 from ..limits import Limits
 from ..model.environment import Comment
 from .source import Source
@@ -82,12 +82,7 @@ class Scanner:
     """
 
     def __init__(
-        self,
-        source: Source,
-        log: DiagnosticLog,
-        start: int = 0,
-        end: int | None = None,
-        part: str = "file",
+        self, source: Source, log: DiagnosticLog, start: int = 0, end: int | None = None, part: str = "file"
     ) -> None:
         self.source = source
         self.log = log
@@ -202,17 +197,13 @@ class Scanner:
         name = next((k for k in choices if k.lower() == token.text.lower()), None)
         if name is not None:
             if exact_case:
-                self.log.warn(
-                    FormatError, "ENV201", token.text, f"{what} {token.text!r} is read as {name!r}",
-                    hint="the original reader compares case here", span=span,
-                )  # fmt: skip
+                hint = "the original reader compares case here"
+                self.log.warn("ENV201", token.text, f"{what} {token.text!r} is read as {name!r}", hint=hint, span=span)
             return choices[name]
         name = misspelling(token.text, choices)
         if name is not None:
-            self.log.warn(
-                FormatError, "ENV202", token.text, f"misspelt {what}: {token.text!r} is read as {name!r}",
-                hint=f"write {name}", span=span,
-            )  # fmt: skip
+            message = f"misspelt {what}: {token.text!r} is read as {name!r}"
+            self.log.warn("ENV202", token.text, message, hint=f"write {name}", span=span)
             return choices[name]
         hint = did_you_mean(token.text, choices) or f"write {_either(choices)} here"
         found = _shortened(token.text)
@@ -239,7 +230,7 @@ class Scanner:
 
     def fail(self, code: str, message: str, *, hint: str = "", span: Span | None = None) -> NoReturn:
         """Raise a `FormatError`, by default at the next word."""
-        self.log.fail(FormatError, code, self.source.path, message, hint=hint, span=span or self.span())
+        self.log.fail(code, self.source.path, message, hint=hint, span=span or self.span())
 
     def fail_expected(self, what: str) -> NoReturn:
         """Raise a `FormatError` that says what was expected and what was found instead."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..errors import FormatError, did_you_mean
+from ..errors import did_you_mean
 from ..model.environment import BaseKind, Body, Dialect, MultiBody, MultiBodyKind, VelocityBounds
 from .blocks import Grammar, check_count, check_limit, is_multibody_tag, read_counted, read_pose, with_directives
 from .bodies import read_body_index, read_connections, read_robot_body, read_static_body, read_surface_body
@@ -67,10 +67,8 @@ def _read_body_of_a(scan: Scanner, grammar: Grammar, *, first: bool) -> Body:
     filename = scan.word("a mesh file", whole=True)
     pose = read_pose(scan, grammar) if not free or scan.next_is_number() else None
     if free and not first and pose is not None:
-        scan.log.info(
-            "ENV301", filename.text, "only the first FreeBody of a robot has a pose; this one is not used",
-            span=pose.span,
-        )  # fmt: skip
+        message = "only the first FreeBody of a robot has a pose; this one is not used"
+        scan.log.info("ENV301", filename.text, message, span=pose.span)
     free_base = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     span = scan.source.span(filename.start, filename.end)
     base = free_base if free else BaseKind.FIXED
@@ -88,10 +86,9 @@ def read_multibody(scan: Scanner, grammar: Grammar) -> MultiBody:
     kind = scan.keyword(_KINDS, "multibody tag")
     span = scan.span(start)
     if grammar.dialect is Dialect.E and kind not in (MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL):
-        scan.log.warn(
-            FormatError, "ENV216", kind.value, f"a {kind.value} multibody in dialect E, whose reader refuses it",
-            hint="a robot has a file of its own in dialect E; read this file as dialect='D'", span=span,
-        )  # fmt: skip
+        message = f"a {kind.value} multibody in dialect E, whose reader refuses it"
+        hint = "a robot has a file of its own in dialect E; read this file as dialect='D'"
+        scan.log.warn("ENV216", kind.value, message, hint=hint, span=span)
     if kind in (MultiBodyKind.ACTIVE, MultiBodyKind.NON_HOLONOMIC):
         multibody = replace(read_robot_bodies(scan, grammar), kind=kind, span=span)
         return _with_controls(scan, multibody) if kind is MultiBodyKind.NON_HOLONOMIC else multibody
@@ -161,11 +158,8 @@ def _with_controls(scan: Scanner, multibody: MultiBody) -> MultiBody:
     controls = tuple(_read_control(scan, f"control {n} of {count}") for n in range(1, count + 1))
     widths = sorted({len(c) for c in controls})
     if len(widths) > 1:
-        scan.log.warn(
-            FormatError, "ENV217", "Controls",
-            f"controls of {widths[0]} to {widths[-1]} numbers; expected equally many",
-            hint="blank lines and comments count as controls", span=span,
-        )  # fmt: skip
+        message = f"controls of {widths[0]} to {widths[-1]} numbers; expected equally many"
+        scan.log.warn("ENV217", "Controls", message, hint="blank lines and comments count as controls", span=span)
     return replace(multibody, velocity_bounds=VelocityBounds(linear, angular), controls=controls)
 
 
@@ -175,10 +169,9 @@ def _read_control(scan: Scanner, what: str) -> tuple[float, ...]:
         scan.fail_expected(what)
     line = scan.line()
     if scan.behind_last_line() and not scan.source.text.endswith(("\n", "\r")):
-        scan.log.warn(
-            FormatError, "ENV210", scan.source.path, f"no newline behind {what}: is it cut off?",
-            hint="end the last line with a newline, if nothing is missing", span=line.span(),
-        )  # fmt: skip
+        message = f"no newline behind {what}: is it cut off?"
+        hint = "end the last line with a newline, if nothing is missing"
+        scan.log.warn("ENV210", scan.source.path, message, hint=hint, span=line.span())
     values: list[float] = []
     while not line.at_end():
         values.append(line.number(what))

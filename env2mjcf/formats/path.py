@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..kinematics.transforms import Array
 from .lexer import parse_number
 from .rows import Extra, Line, Row, fitting, judge_rows, number_lines, parse_row, regrouped, row_text
@@ -88,19 +88,14 @@ def read_path(source: Source, dofs: Sequence[int], links: Sequence[int], log: Di
     head = _read_head(source, log)
     lines = number_lines(source, log, head.end)
     if not lines and head.count:
-        log.fail(
-            FormatError, "CFG514", source.path, f"line 3 declares {head.count} configurations, and none follows",
-            hint="is the file cut off?", span=head.count_span,
-        )  # fmt: skip
+        message = f"line 3 declares {head.count} configurations, and none follows"
+        log.fail("CFG514", source.path, message, hint="is the file cut off?", span=head.count_span)
     found = _poses(source, head, lines, links, log) if _holds_poses(head, lines, dofs, links) else None
     if found is None:
         found = _configurations(source, head, lines, dofs, log)
     if len(found.lines) != head.count:
-        log.warn(
-            FormatError, "CFG514", source.path,
-            f"line 3 declares {head.count} configurations, and {len(found.lines)} follow", hint="is the file cut off?",
-            span=head.count_span,
-        )  # fmt: skip
+        message = f"line 3 declares {head.count} configurations, and {len(found.lines)} follow"
+        log.warn("CFG514", source.path, message, hint="is the file cut off?", span=head.count_span)
     return found
 
 
@@ -121,22 +116,21 @@ def _read_head(source: Source, log: DiagnosticLog) -> _Head:
     start, text = next(lines, (0, ""))
     match = _HEADER_WORDS.fullmatch(text)
     if match is None:
-        log.fail(
-            FormatError, "CFG510", source.path, f"found {text.strip()[:60]!r}; expected '{_HEADER} {CURRENT}'",
-            hint="is it a path file, and whole?", span=source.span(start, start + len(text)),
-        )  # fmt: skip
+        message = f"found {text.strip()[:60]!r}; expected '{_HEADER} {CURRENT}'"
+        hint = "is it a path file, and whole?"
+        log.fail("CFG510", source.path, message, hint=hint, span=source.span(start, start + len(text)))
     version = int(match[1])
     if text.rstrip() != f"{_HEADER} {version}":
-        log.warn(
-            FormatError, "CFG511", source.path, f"the newest planner reads only '{_HEADER} {CURRENT}', to the letter",
-            hint="write three blanks behind VIZMO_PATH_FILE, and nothing in front", span=source.span(start),
-        )  # fmt: skip
+        message = f"the newest planner reads only '{_HEADER} {CURRENT}', to the letter"
+        hint = "write three blanks behind VIZMO_PATH_FILE, and nothing in front"
+        log.warn("CFG511", source.path, message, hint=hint, span=source.span(start))
     if version not in _KNOWN:
         known = ", ".join(map(str, _KNOWN))
+        message = f"path version {version}; known are {known}"
+        hint = "it is read as its rows suggest"
         log.warn(
-            FormatError, "CFG512", source.path, f"path version {version}; known are {known}",
-            hint="it is read as its rows suggest", span=source.span(start + match.start(1), start + match.end(1)),
-        )  # fmt: skip
+            "CFG512", source.path, message, hint=hint, span=source.span(start + match.start(1), start + match.end(1))
+        )
     words = _words_behind(source, start + len(text))
     links, links_span, end = _count(source, words, "number of links of a pose, or 1", log)
     count, count_span, end = _count(source, words, "number of configurations", log)
@@ -153,18 +147,14 @@ def _words_behind(source: Source, start: int) -> list[re.Match[str]]:
 def _count(source: Source, words: list[re.Match[str]], what: str, log: DiagnosticLog) -> tuple[int, Span, int]:
     if not words:
         place = source.span(max(0, len(source.text.rstrip()) - 1))
-        log.fail(
-            FormatError, "CFG515", source.path, f"the file ends where the {what} was expected",
-            hint="is the file cut off?", span=place,
-        )  # fmt: skip
+        hint = "is the file cut off?"
+        log.fail("CFG515", source.path, f"the file ends where the {what} was expected", hint=hint, span=place)
     match = words.pop(0)
     span = source.span(match.start(), match.end())
     value = parse_number(match.group())
     if value is None or value < 0 or not value.is_integer():
-        log.fail(
-            FormatError, "CFG515", source.path, f"expected the {what}, found {match.group()[:60]!r}",
-            hint="line 2 holds a number of links, line 3 a number of configurations", span=span,
-        )  # fmt: skip
+        hint = "line 2 holds a number of links, line 3 a number of configurations"
+        log.fail("CFG515", source.path, f"expected the {what}, found {match.group()[:60]!r}", hint=hint, span=span)
     return int(value), span, match.end()
 
 
@@ -184,21 +174,13 @@ def _poses(source: Source, head: _Head, lines: Sequence[Line], links: Sequence[i
     if head.links not in links:
         listed = " or ".join(map(str, sorted({n for n in links if n})))
         if head.links > 1 or not n:
-            log.fail(
-                FormatError, "CFG517", source.path,
-                f"poses of {head.links} links; expected {listed or 'none'}, the links of the scene's robot",
-                hint="is it the path of another scene?", span=head.links_span,
-            )  # fmt: skip
-        log.warn(
-            FormatError, "CFG513", source.path, f"line 2 says {head.links}, but each configuration is {n} poses",
-            hint=f"write {n}", span=head.links_span,
-        )  # fmt: skip
+            message = f"poses of {head.links} links; expected {listed or 'none'}, the links of the scene's robot"
+            log.fail("CFG517", source.path, message, hint="is it the path of another scene?", span=head.links_span)
+        message = f"line 2 says {head.links}, but each configuration is {n} poses"
+        log.warn("CFG513", source.path, message, hint=f"write {n}", span=head.links_span)
     if len(lines) % n:
-        log.fail(
-            FormatError, "CFG516", source.path,
-            f"the last configuration has {len(lines) % n} poses; expected {n}, one for each link",
-            hint="is the file cut off?", span=lines[-1].span,
-        )  # fmt: skip
+        message = f"the last configuration has {len(lines) % n} poses; expected {n}, one for each link"
+        log.fail("CFG516", source.path, message, hint="is the file cut off?", span=lines[-1].span)
     poses = np.array([line.numbers for line in lines], dtype=np.float64).reshape(-1, n, _POSE)
     return PathFile(head.version, (), poses, tuple(line.span.line for line in lines[::n]))
 
@@ -207,10 +189,8 @@ def _configurations(
     source: Source, head: _Head, lines: Sequence[Line], dofs: Sequence[int], log: DiagnosticLog
 ) -> PathFile:
     if head.links != 1 and lines:
-        log.warn(
-            FormatError, "CFG513", source.path, f"line 2 says {head.links}, but each row is a configuration",
-            hint="write 1", span=head.links_span,
-        )  # fmt: skip
+        message = f"line 2 says {head.links}, but each row is a configuration"
+        log.warn("CFG513", source.path, message, hint="write 1", span=head.links_span)
     if not _all_at_once(lines, dofs):
         lines = regrouped(lines, dofs)
         rows = [fitting(source, line, dofs, log, "path") for line in lines]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import FormatError, did_you_mean
+from ..errors import did_you_mean
 from ..model.environment import Boundary, BoundaryShape, PlannerRules
 from .blocks import read_coordinate
 from .lexer import Scanner
@@ -99,10 +99,8 @@ def _read_robots(problem: Node) -> tuple[tuple[ProblemRobot, ...], set[str]]:
             virtual.add(label)
             continue
         if label in robots:
-            node.fail(
-                "ENV151", f"two robots are called {label!r}; expected a label of its own for each",
-                hint="tasks name robots by their labels", at="label",
-            )  # fmt: skip
+            message = f"two robots are called {label!r}; expected a label of its own for each"
+            node.fail("ENV151", message, hint="tasks name robots by their labels", at="label")
         robots[label] = ProblemRobot(label, node.require("filename"), node)
     return tuple(robots.values()), virtual
 
@@ -118,11 +116,8 @@ def _read_tasks(problem: Node, robots: tuple[ProblemRobot, ...], virtual: set[st
             tasks.append(_read_task(node, robot))
         else:
             known = ", ".join(repr(label) for label in labels) or "none"
-            node.fail(
-                "ENV149",
-                f"task {node.get('label') or ''!r} is for the unknown robot {robot!r}; expected one of: {known}",
-                hint=did_you_mean(robot, labels) or "name a robot of this file", at="robot",
-            )  # fmt: skip
+            message = f"task {node.get('label') or ''!r} is for the unknown robot {robot!r}; expected one of: {known}"
+            node.fail("ENV149", message, hint=did_you_mean(robot, labels) or "name a robot of this file", at="robot")
     return tuple(tasks)
 
 
@@ -153,23 +148,20 @@ def _read_rules(root: Node) -> PlannerRules:
     adjacent += [_read_links(c, name) for c in checkers for name in _ADJACENT_LINKS if c.get(name) is not None]
     rules = PlannerRules(any(self_flags) if self_flags else None, max(adjacent) if adjacent else None)
     if rules != PlannerRules():
-        root.log.info(
-            "ENV309", "<CollisionDetection>",
+        message = (
             "pairs follow the problem file: "
             f"self-collision {'ignored' if rules.ignore_self_collision else 'tested'}, "
-            f"links within {1 if rules.adjacent_links is None else rules.adjacent_links} connections ignored",
-            span=checkers[0].span,
-        )  # fmt: skip
+            f"links within {1 if rules.adjacent_links is None else rules.adjacent_links} connections ignored"
+        )
+        root.log.info("ENV309", "<CollisionDetection>", message, span=checkers[0].span)
     return rules
 
 
 def _read_links(node: Node, name: str) -> int:
     number = node.integer(name)
     if number < 0:
-        node.fail(
-            "ENV110", f"{name} is {number}; expected 0 or more", hint="links within so many connections are not tested",
-            at=name,
-        )  # fmt: skip
+        hint = "links within so many connections are not tested"
+        node.fail("ENV110", f"{name} is {number}; expected 0 or more", hint=hint, at=name)
     return number
 
 
@@ -178,10 +170,8 @@ def _flag(node: Node, name: str) -> bool | None:
     if text is None:
         return None
     if text.strip().lower() not in _TRUE:
-        node.log.warn(
-            FormatError, "ENV213", name, f"{name}={text!r} is not used; expected true or false",
-            hint="write true or false", span=node.span_of(name),
-        )  # fmt: skip
+        message = f"{name}={text!r} is not used; expected true or false"
+        node.log.warn("ENV213", name, message, hint="write true or false", span=node.span_of(name))
         return None
     return _TRUE[text.strip().lower()]
 
@@ -205,8 +195,6 @@ def _axis(parameter: Node) -> tuple[float, float]:
     lower = parameter.read("min", lambda scan: read_coordinate(scan, "min of the boundary"))
     upper = parameter.read("max", lambda scan: read_coordinate(scan, "max of the boundary"))
     if lower > upper:
-        parameter.fail(
-            "ENV114", f"the boundary {lower:g}:{upper:g} is empty; expected min below max",
-            hint=f"write min='{upper:g}' max='{lower:g}'", at="min",
-        )  # fmt: skip
+        message = f"the boundary {lower:g}:{upper:g} is empty; expected min below max"
+        parameter.fail("ENV114", message, hint=f"write min='{upper:g}' max='{lower:g}'", at="min")
     return lower, upper

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..kinematics.tree import build_tree, degrees_of_freedom
 from ..limits import Limits
 from ..model.environment import Dialect, Environment, MultiBody, Task
@@ -74,10 +74,8 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
     first_robot = sum(m.moves for m in environment.multibodies)
     environment = _with_robots(environment, _robots_named(problem, source, options, log), options, log)
     if not environment.robots:
-        log.info(
-            "ENV310", environment.name, "the scene has no robot",
-            hint="give a robot file with robots=[...] (--robots)",
-        )  # fmt: skip
+        hint = "give a robot file with robots=[...] (--robots)"
+        log.info("ENV310", environment.name, "the scene has no robot", hint=hint)
     tasks = _tasks(environment, problem, first_robot, options, log)
     sources = _sources(source, environment, options)
     return dataclasses.replace(environment, tasks=tasks, path=source.path, sources=sources, diagnostics=tuple(log))
@@ -112,15 +110,11 @@ def _xml_environment(root: Node, options: Options) -> Environment:
             f"{root.source.path} is XML, which is dialect E; it cannot be read as dialect {options.dialect}"
         )
     if root.tag.lower() == "robot":
-        root.fail(
-            "ENV131", f"{root.source.path} is a robot file, not an environment",
-            hint="read the environment, and give this file as robots=[...] (--robots)",
-        )  # fmt: skip
+        hint = "read the environment, and give this file as robots=[...] (--robots)"
+        root.fail("ENV131", f"{root.source.path} is a robot file, not an environment", hint=hint)
     if root.tag.lower() != "environment":
-        root.fail(
-            "ENV130", f"unknown root <{root.tag}>; expected <Environment> or <MotionPlanning>",
-            hint="name an environment or a problem file",
-        )  # fmt: skip
+        hint = "name an environment or a problem file"
+        root.fail("ENV130", f"unknown root <{root.tag}>; expected <Environment> or <MotionPlanning>", hint=hint)
     return xml_scene.read_environment(root)
 
 
@@ -192,10 +186,8 @@ class _Size:
 
     def _check(self, what: str, found: int, at_most: int) -> None:
         if found > at_most:
-            self._log.fail(
-                FormatError, "ENV110", self._path, f"the scene has {found} {what} or more; at most {at_most} are read",
-                hint=Limits.hint(what),
-            )  # fmt: skip
+            message = f"the scene has {found} {what} or more; at most {at_most} are read"
+            self._log.fail("ENV110", self._path, message, hint=Limits.hint(what))
 
 
 def _robot_file(source: Source, log: DiagnosticLog) -> MultiBody:
@@ -213,10 +205,8 @@ def _beside(source: Source, name: str, node: Node, options: Options, log: Diagno
     folder = Path(source.path).parent
     path = folder / name
     if not options.allow_outside and "\0" not in name and not _inside(path, folder):
-        log.fail(
-            FormatError, "ENV150", name, f"{name} lies outside the folder of {source.path}; expected a file in it",
-            hint="allow it with allow_outside=True (--allow-outside)", span=named_at,
-        )  # fmt: skip
+        message = f"{name} lies outside the folder of {source.path}; expected a file in it"
+        log.fail("ENV150", name, message, hint="allow it with allow_outside=True (--allow-outside)", span=named_at)
     return path, named_at
 
 

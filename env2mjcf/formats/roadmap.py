@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from .graph import Node, read_nodes
 from .rows import row_text
 from .source import Source
@@ -89,10 +89,8 @@ def read_roadmap(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> Roa
     """
     start = _GRAPH_START.search(source.text)
     if start is None:
-        log.fail(
-            FormatError, "CFG520", source.path, f"{source.path} holds no graph; expected a line '{_START}'",
-            hint="is it a roadmap, and whole?", span=source.line_span(1),
-        )  # fmt: skip
+        message = f"{source.path} holds no graph; expected a line '{_START}'"
+        log.fail("CFG520", source.path, message, hint="is it a roadmap, and whole?", span=source.line_span(1))
     header = _read_header(source, start.start(), log)
     stop = _GRAPH_STOP.search(source.text, start.end())
     end = stop.start() if stop else len(source.text)
@@ -147,10 +145,8 @@ def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
 def _section(source: Source, begin: re.Match[str], end: int, log: DiagnosticLog) -> list[str]:
     stop = re.compile(rf"(?<!#)#{{3,}}{begin[1]}STOP#{{3,}}").search(source.text, begin.end(), end)
     if stop is None:
-        log.warn(
-            FormatError, "CFG530", source.path, f"this section has no end; expected '#####{begin[1]}STOP#####'",
-            hint="it is not used", span=source.span(begin.start(), begin.end()),
-        )  # fmt: skip
+        message = f"this section has no end; expected '#####{begin[1]}STOP#####'"
+        log.warn("CFG530", source.path, message, hint="it is not used", span=source.span(begin.start(), begin.end()))
         return []
     return [line for line in re.split(r"\r\n?|\n", source.text[begin.end() : stop.start()]) if line.strip()]
 
@@ -161,37 +157,32 @@ def _read_counts(source: Source, begin: int, end: int, log: DiagnosticLog) -> tu
     if match is None or not all(re.fullmatch("[0-9]{1,18}", w) for w in words):
         found = source.text[begin:end].split(maxsplit=3)[:3]
         at = begin + len(source.text[begin:end]) - len(source.text[begin:end].lstrip())
-        log.fail(
-            FormatError, "CFG521", source.path,
-            f"expected three counts (nodes, edges, next node) behind GRAPHSTART, found {' '.join(found)[:60]!r}",
-            hint="is the file cut off?", span=source.span(min(at, max(0, len(source.text) - 1))),
-        )  # fmt: skip
+        message = f"expected three counts (nodes, edges, next node) behind GRAPHSTART, found {' '.join(found)[:60]!r}"
+        hint = "is the file cut off?"
+        log.fail("CFG521", source.path, message, hint=hint, span=source.span(min(at, max(0, len(source.text) - 1))))
     return _Counts(int(words[0]), int(words[1]), source.span(match.start(1), match.end(3))), match.end()
 
 
 def _compare(source: Source, counts: _Counts, nodes: Sequence[Node], *, whole: bool, log: DiagnosticLog) -> None:
     """Compare declared counts with what was read."""
     if not whole and len(nodes) < counts.nodes:
-        log.fail(
-            FormatError, "CFG522", source.path,
-            f"the roadmap ends behind {len(nodes)} of {counts.nodes} nodes, without GRAPHSTOP",
-            hint="is the file cut off?", span=source.span(max(0, len(source.text.rstrip()) - 1)),
-        )  # fmt: skip
+        message = f"the roadmap ends behind {len(nodes)} of {counts.nodes} nodes, without GRAPHSTOP"
+        hint = "is the file cut off?"
+        log.fail("CFG522", source.path, message, hint=hint, span=source.span(max(0, len(source.text.rstrip()) - 1)))
     if not whole:
         log.warn(
-            FormatError, "CFG524", source.path, f"the roadmap ends without '{_STOP}'", hint="is the file cut off?",
+            "CFG524",
+            source.path,
+            f"the roadmap ends without '{_STOP}'",
+            hint="is the file cut off?",
             span=source.span(max(0, len(source.text.rstrip()) - 1)),
-        )  # fmt: skip
+        )
     if len(nodes) != counts.nodes:
-        log.warn(
-            FormatError, "CFG523", source.path, f"declares {counts.nodes} nodes, and has {len(nodes)}",
-            hint=f"write {len(nodes)}", span=counts.span,
-        )  # fmt: skip
+        message = f"declares {counts.nodes} nodes, and has {len(nodes)}"
+        log.warn("CFG523", source.path, message, hint=f"write {len(nodes)}", span=counts.span)
     entries = sum(len(node.edges) for node in nodes)
     # Up to 061300 an edge was counted once, later at both of its ends (env-format section 13.3).
     if counts.edges not in (entries, entries / 2):
-        log.warn(
-            FormatError, "CFG523", source.path,
-            f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge",
-            hint=f"write {entries}, or {entries // 2} up to version 061300", span=counts.span,
-        )  # fmt: skip
+        message = f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge"
+        hint = f"write {entries}, or {entries // 2} up to version 061300"
+        log.warn("CFG523", source.path, message, hint=hint, span=counts.span)

@@ -12,7 +12,7 @@ from enum import StrEnum
 from itertools import groupby
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span
+from ..errors import Span
 from ..limits import LARGEST, Limits
 from ..model.environment import Task
 from .lexer import number_hint, parse_number
@@ -127,11 +127,8 @@ def check_rows(source: Source, count: int, log: DiagnosticLog, span: Span) -> No
         FormatError: It has.
     """
     if count > source.limits.rows:
-        log.fail(
-            FormatError, "ENV182", source.path,
-            f"{source.path} has more than {source.limits.rows} configurations; at most so many are read",
-            hint=Limits.hint("rows"), span=span,
-        )  # fmt: skip
+        message = f"{source.path} has more than {source.limits.rows} configurations; at most so many are read"
+        log.fail("ENV182", source.path, message, hint=Limits.hint("rows"), span=span)
 
 
 def _extra(width: int, dof: int, *, legacy: bool) -> Extra | None:
@@ -146,14 +143,10 @@ def _end_list(source: Source, word: str, place: Span, log: DiagnosticLog, *, emp
     # What looks like a number is one that went wrong, not text behind the list.
     hint = coordinate_hint(word)
     if empty or hint or word[0] in "+-.0123456789":
-        log.fail(
-            FormatError, "CFG502", source.path, f"expected a number, found {word[:60]!r}",
-            hint=hint or "write one configuration a line, '#' before comments", span=place,
-        )  # fmt: skip
-    log.warn(
-        FormatError, "CFG501", source.path, "text ends the list of configurations here",
-        hint="begin comment lines with '#'", span=place,
-    )  # fmt: skip
+        hint = hint or "write one configuration a line, '#' before comments"
+        log.fail("CFG502", source.path, f"expected a number, found {word[:60]!r}", hint=hint, span=place)
+    hint = "begin comment lines with '#'"
+    log.warn("CFG501", source.path, "text ends the list of configurations here", hint=hint, span=place)
 
 
 def regrouped(lines: Sequence[Line], dofs: Sequence[int]) -> Sequence[Line]:
@@ -192,12 +185,11 @@ def fitting(source: Source, line: Line, dofs: Sequence[int], log: DiagnosticLog,
     row = parse_row(line.numbers, dofs)
     if row is None:
         expected = " or ".join(f"{d} (robot {i})" for i, d in enumerate(dofs)) or "none: the scene has no robot"
-        log.fail(
-            FormatError, "CFG504", source.path,
+        message = (
             f"a row of {len(line.numbers)} numbers; expected as many as a robot has degrees of freedom, {expected}, "
-            "behind the robot's index or, for robot 0, without",
-            hint=f"is it the {what} of another scene, or cut off?", span=line.span,
-        )  # fmt: skip
+            "behind the robot's index or, for robot 0, without"
+        )
+        log.fail("CFG504", source.path, message, hint=f"is it the {what} of another scene, or cut off?", span=line.span)
     return row
 
 
@@ -209,10 +201,8 @@ def judge_rows(source: Source, rows: Iterable[tuple[Row, Span]], log: Diagnostic
     first = listed[0][0]
     odd = next((span for row, span in listed if (row.indexed, row.extra) != (first.indexed, first.extra)), None)
     if odd is not None:
-        log.warn(
-            FormatError, "CFG506", source.path, "a row that is built otherwise than the first one",
-            hint="give every row, or none, a robot index and velocities", span=odd,
-        )  # fmt: skip
+        hint = "give every row, or none, a robot index and velocities"
+        log.warn("CFG506", source.path, "a row that is built otherwise than the first one", hint=hint, span=odd)
     dropped = next(((row, span) for row, span in listed if row.extra is not Extra.NOTHING), None)
     if dropped is not None:
         row, span = dropped
@@ -249,17 +239,13 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
     """
     lines = regrouped(number_lines(source, log), dofs)
     if not lines:
-        log.fail(
-            FormatError, "CFG503", source.path, f"{source.path} holds no configuration; expected rows of numbers",
-            hint="write one configuration a line", span=source.line_span(1),
-        )  # fmt: skip
+        message = f"{source.path} holds no configuration; expected rows of numbers"
+        log.fail("CFG503", source.path, message, hint="write one configuration a line", span=source.line_span(1))
     rows = [(fitting(source, line, dofs, log, "query"), line.span) for line in lines]
     judge_rows(source, rows, log)
     if len(rows) == 1:
-        log.warn(
-            FormatError, "CFG508", source.path, "one configuration; expected a start and a goal",
-            hint="is the file cut off?", span=rows[0][1],
-        )  # fmt: skip
+        hint = "is the file cut off?"
+        log.warn("CFG508", source.path, "one configuration; expected a start and a goal", hint=hint, span=rows[0][1])
     tasks: list[Task] = []
     for robot, group in groupby(sorted(rows, key=_robot), _robot):
         own = list(group)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError, Span, did_you_mean
+from ..errors import Span, did_you_mean
 from ..limits import Limits
 from ..options import PathArgument
 from ..system.files import open_regular
@@ -120,12 +120,7 @@ def wide_encoding(data: bytes) -> str:
 
 
 def read_source(
-    path: PathArgument,
-    log: DiagnosticLog,
-    limits: Limits,
-    named_at: Span | None = None,
-    *,
-    regular: bool = False,
+    path: PathArgument, log: DiagnosticLog, limits: Limits, named_at: Span | None = None, *, regular: bool = False
 ) -> Source:
     """Read a text file.
 
@@ -145,35 +140,30 @@ def read_source(
     data = _read_bytes(name, log, limits, named_at, regular)
     wide = wide_encoding(data)
     if wide:
-        log.fail(
-            FormatError, "ENV106", name, f"{name} is {wide} text; expected UTF-8 or Latin-1",
-            hint="save it as UTF-8", span=Span(name, 1, 1),
-        )  # fmt: skip
+        hint = "save it as UTF-8"
+        log.fail("ENV106", name, f"{name} is {wide} text; expected UTF-8 or Latin-1", hint=hint, span=Span(name, 1, 1))
     if b"\0" in data:
         before = data[: data.index(b"\0")].decode("latin-1")
         place = Source.of(name, before).span(len(before))
-        log.fail(
-            FormatError, "ENV107", name,
+        message = (
             f"{name} is not a text file: line {place.line} holds a NUL byte; "
-            "expected an environment, robot or query file",
-            hint="name the scene's text file, not a mesh or an archive", span=Span(name, place.line, place.column),
-        )  # fmt: skip
+            "expected an environment, robot or query file"
+        )
+        hint = "name the scene's text file, not a mesh or an archive"
+        log.fail("ENV107", name, message, hint=hint, span=Span(name, place.line, place.column))
     try:
         return Source.of(name, data.decode("utf-8-sig"), limits)
     except UnicodeDecodeError as error:
         source = Source.of(name, data.decode("latin-1"), limits)
         place = source.span(error.start)
-        log.warn(
-            FormatError, "ENV108", name,
-            f"{name} is not UTF-8 (byte {data[error.start]:#04x} on line {place.line}); read as Latin-1",
-            hint="save it as UTF-8", span=place,
-        )  # fmt: skip
+        message = f"{name} is not UTF-8 (byte {data[error.start]:#04x} on line {place.line}); read as Latin-1"
+        log.warn("ENV108", name, message, hint="save it as UTF-8", span=place)
         return source
 
 
 def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | None, regular: bool) -> bytes:
     def fail(code: str, message: str, hint: str) -> NoReturn:
-        log.fail(FormatError, code, name, message, hint=hint, span=named_at)
+        log.fail(code, name, message, hint=hint, span=named_at)
 
     if "\0" in name:
         fail("ENV104", f"{name!r} cannot be read: no file has a NUL character in its name", "check the name")

@@ -13,7 +13,7 @@ from typing import Any, NoReturn, TypeVar
 from lxml import etree
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic, FormatError, Severity, Span, did_you_mean
+from ..errors import Diagnostic, Severity, Span, did_you_mean
 from ..limits import Limits
 from .lexer import Scanner
 from .source import Source
@@ -61,10 +61,9 @@ def _root_of(source: Source, log: DiagnosticLog) -> int:
     if found is None:
         return len(source.text)
     if found.lastgroup == "entity":
-        log.fail(
-            FormatError, "ENV144", source.path, "XML entity declarations are not read; expected plain XML",
-            hint="write the text itself where an entity stands", span=source.span(*found.span()),
-        )  # fmt: skip
+        message = "XML entity declarations are not read; expected plain XML"
+        hint = "write the text itself where an entity stands"
+        log.fail("ENV144", source.path, message, hint=hint, span=source.span(*found.span()))
     return found.start()
 
 
@@ -88,10 +87,8 @@ def _parse(source: Source, entity: re.Match[str] | None, log: DiagnosticLog) -> 
     cut = _problem_alone(source, fault.span.line)
     if cut is None:
         _fail(fault, log)
-    log.warn(
-        FormatError, "ENV214", source.path, f"{fault.message}; only the problem above it is read",
-        hint="the planner's library section is not needed, but its collision rules are unknown now", span=fault.span,
-    )  # fmt: skip
+    hint = "the planner's library section is not needed, but its collision rules are unknown now"
+    log.warn("ENV214", source.path, f"{fault.message}; only the problem above it is read", hint=hint, span=fault.span)
     closing, end = cut
     try:
         return _from_text(source, source.text[begin:end] + closing, log), end
@@ -122,7 +119,7 @@ def _named(source: Source, entity: re.Match[str]) -> Diagnostic:
 
 
 def _fail(fault: Diagnostic, log: DiagnosticLog) -> NoReturn:
-    log.fail(FormatError, fault.code, fault.subject, fault.message, hint=fault.hint, span=fault.span)
+    log.fail(fault.code, fault.subject, fault.message, hint=fault.hint, span=fault.span)
 
 
 def _from_text(source: Source, text: str, log: DiagnosticLog) -> Any:
@@ -155,10 +152,8 @@ def _from_text(source: Source, text: str, log: DiagnosticLog) -> Any:
 def _refuse(source: Source, line: int, what: str, log: DiagnosticLog) -> NoReturn:
     most = getattr(source.limits, what)
     found = f"more than {most} elements lie within each other" if what == "nesting" else f"more than {most} elements"
-    log.fail(
-        FormatError, "ENV180", source.path, f"{found}; at most so many are read", hint=Limits.hint(what),
-        span=source.line_span(line),
-    )  # fmt: skip
+    hint = Limits.hint(what)
+    log.fail("ENV180", source.path, f"{found}; at most so many are read", hint=hint, span=source.line_span(line))
 
 
 def _problem_alone(source: Source, fault_line: int) -> tuple[str, int] | None:
@@ -245,10 +240,8 @@ class Node:
         found = list(self.children(tag))
         if len(found) != 1:
             at = found[1] if found else self
-            at.fail(
-                code, f"<{self.tag}> has {len(found)} <{tag}> elements; expected one",
-                hint="remove the others" if found else f"add a <{tag}>",
-            )  # fmt: skip
+            hint = "remove the others" if found else f"add a <{tag}>"
+            at.fail(code, f"<{self.tag}> has {len(found)} <{tag}> elements; expected one", hint=hint)
         return found[0]
 
     def get(self, name: str) -> str | None:
@@ -297,16 +290,14 @@ class Node:
         folded = {k.lower(): v for k, v in choices.items()}
         if text.lower() not in folded:
             expected = " or ".join(repr(k) for k in choices)
-            self.fail(
-                "ENV142", f"unknown {name} {text!r}; expected {expected}",
-                hint=did_you_mean(text[:60], choices) or f"write {expected}", at=name,
-            )  # fmt: skip
+            hint = did_you_mean(text[:60], choices) or f"write {expected}"
+            self.fail("ENV142", f"unknown {name} {text!r}; expected {expected}", hint=hint, at=name)
         return folded[text.lower()]
 
     def fail(self, code: str, message: str, *, hint: str = "", at: str | None = None) -> NoReturn:
         """Raise a `FormatError` at the element or at one of its attributes."""
         span = self.span_of(at) if at else self.span
-        self.log.fail(FormatError, code, f"<{self.tag}>", message, hint=hint, span=span)
+        self.log.fail(code, f"<{self.tag}>", message, hint=hint, span=span)
 
     def ignore_other_children(self, *known: str) -> None:
         """Report the child elements that nothing reads."""
@@ -321,9 +312,12 @@ class Node:
         places = self._values() if others else {}
         for name in others:
             self.log.info(
-                "ENV311", f"<{self.tag}>", f"attribute {name!r} of <{self.tag}> is not used",
-                hint=did_you_mean(name, known), span=self.source.span(*places[name]) if name in places else self.span,
-            )  # fmt: skip
+                "ENV311",
+                f"<{self.tag}>",
+                f"attribute {name!r} of <{self.tag}> is not used",
+                hint=did_you_mean(name, known),
+                span=self.source.span(*places[name]) if name in places else self.span,
+            )
 
     def ignore(self, message: str) -> None:
         """Report that nothing reads this element."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import FormatError
 from ..model.environment import (
     Actuator,
     BaseKind,
@@ -102,10 +101,9 @@ def _read_actuators(node: Node) -> tuple[Actuator, ...]:
         Actuator(a.get("label") or "", tuple(sorted(a.attributes.items())), a.span) for a in node.children("Actuator")
     )
     if actuators:
-        node.log.info(
-            "ENV308", "<Actuator>", f"{len(actuators)} planner actuators are kept, but not simulated",
-            hint="actuators='position' adds position actuators", span=actuators[0].span,
-        )  # fmt: skip
+        message = f"{len(actuators)} planner actuators are kept, but not simulated"
+        hint = "actuators='position' adds position actuators"
+        node.log.info("ENV308", "<Actuator>", message, hint=hint, span=actuators[0].span)
     return actuators
 
 
@@ -119,10 +117,9 @@ def _read_boundaries(node: Node) -> Boundary | None:
         if child.element is not used.element:
             child.ignore("another <Boundary> is not used")
     if boundary.space != "workspace":
-        node.log.warn(
-            FormatError, "ENV212", "Boundary", f"a boundary of the {boundary.space} is used as one of the workspace",
-            hint="give a boundary with space='workspace'", span=used.span_of("space"),
-        )  # fmt: skip
+        message = f"a boundary of the {boundary.space} is used as one of the workspace"
+        hint = "give a boundary with space='workspace'"
+        node.log.warn("ENV212", "Boundary", message, hint=hint, span=used.span_of("space"))
     return boundary
 
 
@@ -174,29 +171,23 @@ def _read_body(node: Node, base: BaseKind, *more_attributes: str) -> Body:
 def _read_fixed_pose(node: Node) -> Pose:
     if node.get("transform") is not None:
         return node.read("transform", _pose)
-    node.log.warn(
-        FormatError, "ENV219", f"<{node.tag}>", "a fixed body without transform; it stands at the origin",
-        hint="write transform='x y z rx ry rz'", span=node.span,
-    )  # fmt: skip
+    message = "a fixed body without transform; it stands at the origin"
+    node.log.warn("ENV219", f"<{node.tag}>", message, hint="write transform='x y z rx ry rz'", span=node.span)
     return Pose()
 
 
 def _read_mass(node: Node) -> float:
     mass = node.number("mass")
     if mass <= 0:
-        node.fail(
-            "ENV118", f"mass {mass:g}; expected a positive number",
-            hint="leave it out to have it computed from the density", at="mass",
-        )  # fmt: skip
+        hint = "leave it out to have it computed from the density"
+        node.fail("ENV118", f"mass {mass:g}; expected a positive number", hint=hint, at="mass")
     return mass
 
 
 def _check_link(link: Node, number: int) -> None:
     if link.get("index") is not None and link.integer("index") != number:
-        link.fail(
-            "ENV146", f"link index {link.get('index')} where {number} was expected",
-            hint="links stand in the order of their indices", at="index",
-        )  # fmt: skip
+        hint = "links stand in the order of their indices"
+        link.fail("ENV146", f"link index {link.get('index')} where {number} was expected", hint=hint, at="index")
     if link.get("type") is not None:
         link.choice("type", {"joint": None})
 
@@ -210,10 +201,8 @@ def _read_connection(link: Node, number: int, bodies: int) -> Connection:
 
     previous, following = index("parentIndex"), index("childIndex")
     if following != number:
-        node.fail(
-            "ENV147", f"the connection of link {number} leads to body {following}; expected {number}",
-            hint="each link holds the one connection that leads to it", at="childIndex",
-        )  # fmt: skip
+        message = f"the connection of link {number} leads to body {following}; expected {number}"
+        node.fail("ENV147", message, hint="each link holds the one connection that leads to it", at="childIndex")
     if previous == following:
         node.fail("ENV116", SELF_CONNECTION.format(previous), hint="parentIndex names another body", at="parentIndex")
     joint = node.choice("joint", _JOINTS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import GeometryError, Span
+from ..errors import Span
 from ..limits import Work
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
@@ -170,7 +170,7 @@ def mesh_diagnostics(
     subject = subject or mesh.name
 
     def warn(code: str, message: str, hint: str = "") -> None:
-        log.warn(GeometryError, code, subject, message, hint=hint, span=span)
+        log.warn(code, subject, message, hint=hint, span=span)
 
     def note(code: str, message: str) -> None:
         log.info(code, subject, message, span=span)
@@ -211,7 +211,6 @@ def refuse_without_area(analysis: Analysis, log: DiagnosticLog, subject: str, sp
     """
     what = ("a point", "a line")[min(analysis.dimension, 1)]
     log.fail(
-        GeometryError,
         "GEO231",
         subject,
         f"the mesh has no area: its faces collapse to {what}" if analysis.diagonal else "the mesh has no area",

@@ -10,7 +10,6 @@ from typing import NoReturn
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, GeometryError
 from ..kinematics.forward import RobotKinematics
 from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits, Work, bounded
@@ -233,7 +232,7 @@ class _Meshes:
 
     def _refuse(self, code: str, body: Body, what: str, limit: str) -> NoReturn:
         message = f"the bodies up to this one have {what}, which is the limit"
-        self._log.fail(GeometryError, code, body.filename, message, hint=Limits.hint(limit), span=body.span)
+        self._log.fail(code, body.filename, message, hint=Limits.hint(limit), span=body.span)
 
     def _repaired(self, mesh: Mesh, body: Body) -> Repaired:
         work = self._work[mesh] = Work(self._options.limits.mesh_work)
@@ -256,12 +255,11 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
     for multibody in environment.multibodies:
         for connection in multibody.connections:
             if connection.joint is JointType.SMA:
-                log.fail(
-                    ConversionError, "KIN320", "SMAJoint",
+                message = (
                     "an SMAJoint bends along its length, which no MuJoCo joint does: "
-                    "the scene reads, but does not convert",
-                    hint="replace it by Revolute joints", span=connection.span,
-                )  # fmt: skip
+                    "the scene reads, but does not convert"
+                )
+                log.fail("KIN320", "SMAJoint", message, hint="replace it by Revolute joints", span=connection.span)
 
 
 def _overflow_is_seen_later() -> np.errstate:
@@ -280,11 +278,11 @@ def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array,
         farthest = float(np.abs(world).max())
         # Not a number compares as false.
         if not farthest <= LARGEST:
-            log.fail(
-                GeometryError, "GEO252", b.name, f"{b.name} reaches {farthest:.3g} m from the origin at home; at most "
-                f"{LARGEST:g} can be computed with", hint="correct its pose, or the connections that lead to it",
-                span=b.body.span,
-            )  # fmt: skip
+            message = (
+                f"{b.name} reaches {farthest:.3g} m from the origin at home; at most {LARGEST:g} can be computed with"
+            )
+            hint = "correct its pose, or the connections that lead to it"
+            log.fail("GEO252", b.name, message, hint=hint, span=b.body.span)
         corners += [world.min(axis=0), world.max(axis=0)]
     stacked = np.array(corners)
     return stacked.min(axis=0), stacked.max(axis=0)
@@ -293,7 +291,5 @@ def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array,
 def _check_extent(environment: Environment, extent: float, log: DiagnosticLog) -> None:
     low, high = _PLAUSIBLE_EXTENT
     if not low <= extent <= high:
-        log.info(
-            "GEO251", environment.name, f"the scene measures {extent:.3g} m across: is its unit a metre?",
-            hint="give the metres per file unit with scale= (--scale)",
-        )  # fmt: skip
+        message = f"the scene measures {extent:.3g} m across: is its unit a metre?"
+        log.info("GEO251", environment.name, message, hint="give the metres per file unit with scale= (--scale)")

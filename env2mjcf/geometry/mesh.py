@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import GeometryError
 from ..formats.meshes.byu import read_byu, read_gms
 from ..formats.meshes.obj import read_obj
 from ..formats.meshes.text import MeshArrays
@@ -111,7 +110,6 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
     extension = path.suffix.lower()
     if extension not in READABLE:
         log.fail(
-            GeometryError,
             "GEO207",
             str(path),
             f"{path} has the extension {path.suffix!r}; meshes that can be read: {', '.join(READABLE)}",
@@ -121,7 +119,7 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
         wide = wide_encoding(data)
         if wide:
             message = f"{path} is {wide} text; expected ASCII, UTF-8 or Latin-1"
-            log.fail(GeometryError, "GEO274", str(path), message, hint="save it as UTF-8")
+            log.fail("GEO274", str(path), message, hint="save it as UTF-8")
         vertices, faces = _READERS[extension](data, str(path), log, limits)
     else:
         log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
@@ -129,7 +127,7 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
     largest = float(np.abs(vertices).max())
     if largest > LARGEST:
         message = f"{path} has a coordinate of {largest:.3g}; at most {LARGEST:g} can be computed with"
-        log.fail(GeometryError, "GEO276", str(path), message, hint="is the file damaged, or in another format?")
+        log.fail("GEO276", str(path), message, hint="is the file damaged, or in another format?")
     return Mesh.from_arrays(path.stem, vertices, faces, path)
 
 
@@ -140,15 +138,9 @@ def _content(path: Path, log: DiagnosticLog, limits: Limits) -> bytes:
             data = read_at_most(file, limits.file_bytes + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        log.fail(GeometryError, "GEO204", str(path), f"{path} cannot be read: {reason}")
+        log.fail("GEO204", str(path), f"{path} cannot be read: {reason}")
     if len(data) > limits.file_bytes:
-        log.fail(
-            GeometryError,
-            "GEO209",
-            str(path),
-            f"{path} has more than {limits.file_bytes} bytes",
-            hint=Limits.hint("file_bytes"),
-        )
+        log.fail("GEO209", str(path), f"{path} has more than {limits.file_bytes} bytes", hint=Limits.hint("file_bytes"))
     return data
 
 
@@ -162,17 +154,17 @@ def _through_trimesh(data: bytes, extension: str, path: Path, log: DiagnosticLog
         vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
     except Exception as error:  # trimesh's loaders raise whatever they stumble over
         message = f"{path} cannot be read as {extension}: {type(error).__name__}: {error}"
-        log.fail(GeometryError, "GEO226", str(path), message)
+        log.fail("GEO226", str(path), message)
     if not len(vertices) or not len(faces):
-        log.fail(GeometryError, "GEO210", str(path), f"{path} has no triangle", hint="expected at least one triangle")
+        log.fail("GEO210", str(path), f"{path} has no triangle", hint="expected at least one triangle")
     if not np.isfinite(vertices).all():
-        log.fail(GeometryError, "GEO212", str(path), f"{path} has vertices that are not finite")
+        log.fail("GEO212", str(path), f"{path} has vertices that are not finite")
     if faces.min() < 0 or faces.max() >= len(vertices):
         message = f"{path} has a triangle with vertex {faces.max()}; expected 0 to {len(vertices) - 1}"
-        log.fail(GeometryError, "GEO214", str(path), message)
+        log.fail("GEO214", str(path), message)
     if max(len(vertices), faces.size) > limits.mesh_elements:
         message = (
             f"{path} has {len(vertices)} vertices and {faces.size} corners; at most {limits.mesh_elements} are read"
         )
-        log.fail(GeometryError, "GEO209", str(path), message, hint=Limits.hint("mesh_elements"))
+        log.fail("GEO209", str(path), message, hint=Limits.hint("mesh_elements"))
     return vertices, faces

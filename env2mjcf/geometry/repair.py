@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import GeometryError, Span
+from ..errors import Span
 from ..limits import COSTLY, Work
 from .analysis import Analysis, analyse, mesh_diagnostics
 from .folds import unfolded
@@ -112,20 +112,18 @@ def repair_diagnostics(
     """
     if result.cut_faces:
         outcome = "the surface is closed now" if result.analysis.closed else "other edges are open still"
-        log.warn(
-            GeometryError, "GEO242", subject or mesh.name,
+        message = (
             f"{result.left_open} open edges, because vertices lie in the middle of other edges (T-junctions); "
-            f"{result.cut_faces} faces were cut there, and {outcome}",
-            span=span,
-        )  # fmt: skip
+            f"{result.cut_faces} faces were cut there, and {outcome}"
+        )
+        log.warn("GEO242", subject or mesh.name, message, span=span)
     if result.folded_faces:
         sheets = f"; {result.sheets} of them reach beyond the solid and stay as sheets" if result.sheets else ""
-        log.warn(
-            GeometryError, "GEO244", subject or mesh.name,
+        message = (
             f"flat parts of {result.folded_faces} faces in all are folded over themselves: "
-            f"they were triangulated anew{sheets}",
-            span=span,
-        )  # fmt: skip
+            f"they were triangulated anew{sheets}"
+        )
+        log.warn("GEO244", subject or mesh.name, message, span=span)
     mesh_diagnostics(mesh, result.analysis, log, subject, span)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ..diagnostics import DiagnosticLog
-from ..errors import GeometryError, Span, did_you_mean
+from ..errors import Span, did_you_mean
 from ..model.environment import Environment
 from ..options import Options
 
@@ -55,7 +55,7 @@ def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) 
                 for p in (first, *others)
             )
             message, hint = f"{len(problems)} mesh files cannot be used:\n" + "\n".join(lines), ""
-        log.fail(GeometryError, first.code, first.name, message, hint=hint, span=first.span)
+        log.fail(first.code, first.name, message, hint=hint, span=first.span)
     return found
 
 
@@ -69,10 +69,8 @@ def find_all(
     """
     for extra in options.mesh_dirs:
         if not Path(extra).is_dir():
-            log.warn(
-                GeometryError, "GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder",
-                hint="check the path: it is relative to the current directory",
-            )  # fmt: skip
+            hint = "check the path: it is relative to the current directory"
+            log.warn("GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder", hint=hint)
     finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
     found: dict[str, Path] = {}
     problems: dict[str, Problem] = {}
@@ -111,12 +109,12 @@ class _Finder:
             found = self._first_file(slashed)
             if found is not None:
                 message = f"the backslashes of {name!r} are read as slashes"
-                self._log.warn(GeometryError, "GEO206", name, message, hint=f"write {slashed}", span=span)
+                self._log.warn("GEO206", name, message, hint=f"write {slashed}", span=span)
         if found is None:
             found = self._any_case(slashed)
             if found is not None:
                 message = f"there is no {name!r}; {str(found)!r}, which differs in case, is read"
-                self._log.warn(GeometryError, "GEO205", name, message, hint="write the name as the file's", span=span)
+                self._log.warn("GEO205", name, message, hint="write the name as the file's", span=span)
         if found is None:
             return self._missing(name, span)
         if not self._inside(found):

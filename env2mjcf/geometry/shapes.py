@@ -103,7 +103,7 @@ def collision_shape(
             shape = build()
     except DecompositionError as error:
         hint = "collision='auto' collides the true shape, without CoACD"
-        log.fail(GeometryError, "GEO262", subject or mesh.name, f"{mesh.name}: {error}", hint=hint, span=span)
+        log.fail("GEO262", subject or mesh.name, f"{mesh.name}: {error}", hint=hint, span=span)
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
         log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)

@@ -187,10 +187,9 @@ class GeometryCache:
     def _complain(self, error: OSError, log: DiagnosticLog) -> None:
         """Say once that the cache is of no use."""
         if self._writable:
-            log.info(
-                "GEO261", str(self.folder), f"the geometry cache cannot be used: {error.strerror or error}",
-                hint=f"set {FOLDER_VARIABLE} to a folder that may be written, or cache=False (--no-cache)",
-            )  # fmt: skip
+            message = f"the geometry cache cannot be used: {error.strerror or error}"
+            hint = f"set {FOLDER_VARIABLE} to a folder that may be written, or cache=False (--no-cache)"
+            log.info("GEO261", str(self.folder), message, hint=hint)
         self._writable = False
 
     def _make_room(self, new: Path, size: int) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
-from ..errors import KinematicsError
 from ..model.environment import BaseKind, DHForm, Dialect, MultiBody, Pose
 from ..system.locks import lasting
 from .transforms import Array, dh_matrix, inverse, pose_matrix, rotation_matrix, transform, wrap
@@ -135,12 +134,11 @@ class RobotKinematics:
             clipped = float(np.clip(q[i], dof.lower, dof.upper))
             connection = self.multibody.connections[dof.connection]
             name = self.multibody.bodies[dof.body].filename
-            log.warn(
-                KinematicsError, "KIN310", name,
+            message = (
                 f"{dof.kind} of {name} is {q[i]:.6g} in the file, outside its limits {dof.lower:.6g} to "
-                f"{dof.upper:.6g}; home has {clipped:.6g}",
-                span=connection.dh.span,
-            )  # fmt: skip
+                f"{dof.upper:.6g}; home has {clipped:.6g}"
+            )
+            log.warn("KIN310", name, message, span=connection.dh.span)
             q[i] = clipped
         return q
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 from ..diagnostics import DiagnosticLog
-from ..errors import KinematicsError
 from ..model.dialects import RULES, JointOrder
 from ..model.environment import BaseKind, Connection, Dialect, JointType, MultiBody
+from ..model.names import unique
 
 
 class DofKind(StrEnum):
@@ -131,15 +132,11 @@ def _turn(kind: DofKind, sign: int) -> float:
 def _adopt_stray(multibody: MultiBody, index: int, bases: dict[int, BaseKind], log: DiagnosticLog) -> None:
     body = multibody.bodies[index]
     if multibody.dialect is not Dialect.A:
-        log.fail(
-            KinematicsError, "KIN301", body.filename,
-            f"body {index} ({body.filename}) is a Joint, but no connection leads to it",
-            hint="add a connection, or give it a base (Planar, Volumetric, Fixed)", span=body.span,
-        )  # fmt: skip
-    log.warn(
-        KinematicsError, "KIN302", body.filename,
-        f"no connection leads to FreeBody {index} ({body.filename}); it gets a free base of its own", span=body.span,
-    )  # fmt: skip
+        message = f"body {index} ({body.filename}) is a Joint, but no connection leads to it"
+        hint = "add a connection, or give it a base (Planar, Volumetric, Fixed)"
+        log.fail("KIN301", body.filename, message, hint=hint, span=body.span)
+    message = f"no connection leads to FreeBody {index} ({body.filename}); it gets a free base of its own"
+    log.warn("KIN302", body.filename, message, span=body.span)
     bases[index] = BaseKind.VOLUMETRIC_ROTATIONAL
 
 
@@ -157,11 +154,9 @@ def _order(
         reached = set(order)
         lost = next(i for i in range(len(multibody.bodies)) if i not in reached)
         body = multibody.bodies[lost]
-        log.fail(
-            KinematicsError, "KIN303", body.filename,
-            f"body {lost} ({body.filename}) hangs in a cycle of connections that no base belongs to",
-            hint="let one connection of the cycle come from a base", span=body.span,
-        )  # fmt: skip
+        message = f"body {lost} ({body.filename}) hangs in a cycle of connections that no base belongs to"
+        hint = "let one connection of the cycle come from a base"
+        log.fail("KIN303", body.filename, message, hint=hint, span=body.span)
     return tuple(order)
 
 
@@ -183,3 +178,13 @@ def _joint_dofs(connection: Connection, index: int, loop: bool, periodic: bool) 
             lower, upper = connection.limits[n].lower, connection.limits[n].upper
         dofs.append(Dof(kind, connection.next, index, loop, lower, upper, periodic and angle))
     return dofs
+
+
+def dof_name(link: str, dof: Dof) -> str:
+    """Return the name of a degree of freedom: `link.theta`, or `link.theta(loop)` where it moves nothing."""
+    return f"{link}.{dof.kind}{'(loop)' if dof.loop else ''}"
+
+
+def dof_names(links: tuple[str, ...], dofs: Iterable[Dof]) -> tuple[str, ...]:
+    """Return unique names for a robot's degrees of freedom."""
+    return tuple(unique(dof_name(links[d.body], d) for d in dofs))

@@ -6,7 +6,6 @@ MERGED: Says what a scene holds that has no meaning in its MJCF: nothing is drop
 from __future__ import annotations
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError
 from ..kinematics.tree import build_tree
 from ..model.environment import Environment, MultiBody
 from ..options import Options
@@ -36,12 +35,12 @@ def _refuse(robot: MultiBody, log: DiagnosticLog) -> None:
         depth[body] = 1 if k is None else depth[robot.connections[k].previous] + 1
         if k is not None and depth[body] > _MOST_LINKS:
             name = robot.bodies[body].filename
-            log.fail(
-                ConversionError, "MJC403", name,
+            message = (
                 f"this connection leads to link {depth[body]} of a chain; MuJoCo's XML parser reads at most "
-                f"{_MOST_LINKS} bodies within each other",
-                hint="make the chain shorter, or a robot of its own of a part", span=robot.connections[k].span,
-            )  # fmt: skip
+                f"{_MOST_LINKS} bodies within each other"
+            )
+            hint = "make the chain shorter, or a robot of its own of a part"
+            log.fail("MJC403", name, message, hint=hint, span=robot.connections[k].span)
 
 
 # Attributes of an <Environment> node that concern the planner's own simulation.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import KinematicsError
 from ..geometry.assembly import RobotParts
 from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind
@@ -55,10 +54,11 @@ def _add_loop(
         add(equality, "weld", name=name, site1=a, site2=b, active=active)
         return
     if connection.joint is JointType.PRISMATIC:
-        log.info(
-            "MJC410", following.name, f"the loop of {previous.name} and {following.name} closes by a slide, "
-            "which MuJoCo cannot express as an equality; the simulation leaves it open", span=connection.span,
-        )  # fmt: skip
+        message = (
+            f"the loop of {previous.name} and {following.name} closes by a slide, "
+            "which MuJoCo cannot express as an equality; the simulation leaves it open"
+        )
+        log.info("MJC410", following.name, message, span=connection.span)
         return
     # One point leaves a ball joint; a second one on the same axis leaves the hinge.
     axis = np.array([0.0, 0.0, max(previous.radius, following.radius)])
@@ -97,8 +97,5 @@ def _axis_gap(robot: RobotParts, k: int) -> float:
 def _report_open(robot: RobotParts, k: int, gap: float, log: DiagnosticLog) -> None:
     connection = robot.kinematics.multibody.connections[k]
     a, b = robot.links[connection.previous].name, robot.links[connection.next].name
-    log.warn(
-        KinematicsError, "KIN311", b,
-        f"the loop of {a} and {b} is open by {gap:.3g} m at home; its equality is written, but inactive",
-        hint="give the connections the theta values of a closed pose", span=connection.span,
-    )  # fmt: skip
+    message = f"the loop of {a} and {b} is open by {gap:.3g} m at home; its equality is written, but inactive"
+    log.warn("KIN311", b, message, hint="give the connections the theta values of a closed pose", span=connection.span)

@@ -1,4 +1,4 @@
-"""Unique, readable names for bodies and degrees of freedom."""
+"""Unique, readable names for bodies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from pathlib import PurePosixPath
 
-from ..kinematics.tree import Dof
 from .environment import Environment, MultiBody
 
 # '/' and ':' are separators in MuJoCo names of this project; '\0' stands for what cannot be seen.
@@ -81,13 +80,3 @@ def body_names(environment: Environment) -> dict[int, tuple[str, ...]]:
 def robot_index(robots: tuple[MultiBody, ...], multibody: MultiBody) -> int | None:
     """Return which robot a multibody is, or None; equal multibodies are told apart by identity."""
     return next((k for k, r in enumerate(robots) if r is multibody), None)
-
-
-def dof_name(link: str, dof: Dof) -> str:
-    """Return the name of a degree of freedom: `link.theta`, or `link.theta(loop)` where it moves nothing."""
-    return f"{link}.{dof.kind}{'(loop)' if dof.loop else ''}"
-
-
-def dof_names(links: tuple[str, ...], dofs: Iterable[Dof]) -> tuple[str, ...]:
-    """Return unique names for a robot's degrees of freedom."""
-    return tuple(unique(dof_name(links[d.body], d) for d in dofs))

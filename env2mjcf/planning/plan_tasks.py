@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
@@ -160,10 +159,9 @@ def _step(scene: Scene, resolution: float | None) -> float:
     if resolution is not None:
         raise ValueError(f"resolution is {resolution}; expected at least {least:.3g} m, 1e-5 of the extent")
     of_file = scene.environment.resolution
-    DiagnosticLog().fail(
-        FormatError, "CFG536", "PositionRes", f"PositionRes {of_file.position:g}: planning takes steps of at least "
-        f"{least:.3g} m, 1e-5 of the extent", hint="correct PositionRes, or give --resolution", span=of_file.span,
-    )  # fmt: skip
+    message = f"PositionRes {of_file.position:g}: planning takes steps of at least {least:.3g} m, 1e-5 of the extent"
+    hint = "correct PositionRes, or give --resolution"
+    DiagnosticLog().fail("CFG536", "PositionRes", message, hint=hint, span=of_file.span)
 
 
 def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int) -> None:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..contact.edges import EdgeSteps
 from ..diagnostics import DiagnosticLog
-from ..errors import FormatError
 from ..kinematics.transforms import Array
 from ..system.locks import lasting
 from .scene import Scene
@@ -175,15 +174,12 @@ class EdgeJudge:
         environment, log = self._scene.environment, DiagnosticLog()
         counts = self._steps.counts(start, delta, self._steps.usual)
         if counts.sum(dtype=np.float64) <= _MOST_CHECKS:
-            log.fail(
-                FormatError, "CFG536", "PositionRes", f"PositionRes {environment.resolution.position:g}: {message}",
-                hint="correct PositionRes, or give --resolution", span=environment.resolution.span,
-            )  # fmt: skip
+            message = f"PositionRes {environment.resolution.position:g}: {message}"
+            hint = "correct PositionRes, or give --resolution"
+            log.fail("CFG536", "PositionRes", message, hint=hint, span=environment.resolution.span)
         longest = self._edges.labels[int(owner[np.argmax(counts)])]
-        log.fail(
-            FormatError, "CFG537", longest, f"{longest} is too long: {message}",
-            hint="is a number of its ends wrong? Else give --resolution",
-        )  # fmt: skip
+        hint = "is a number of its ends wrong? Else give --resolution"
+        log.fail("CFG537", longest, f"{longest} is too long: {message}", hint=hint)
 
     def _walk(self, start: Array, delta: Array, owner: Indices, counts: Indices) -> None:
         """Check all edges at even steps, `counts` of each, and note the first check of each that fails."""

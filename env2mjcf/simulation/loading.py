@@ -8,7 +8,6 @@ from typing import Any
 from ..contact.exact.engine import require
 from ..contact.types import Contact
 from ..diagnostics import DiagnosticLog
-from ..errors import KinematicsError
 from ..model.environment import Dialect
 from ..options import Options, PathArgument
 from ..pipeline import Compiled, compile_scene, recompile
@@ -72,14 +71,9 @@ def _report_touching(compiled: Compiled, link: str, other: str, contact: Contact
     body = next(p.body for p in compiled.assembly.parts() if p.name == link)
     if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
         # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
-        log.info(
-            "KIN312", link, f"{link} and {other} touch at home, where the base is at the origin",
-            hint="" if compiled.environment.tasks else "give a query: simulations can begin at its start",
-            span=body.span,
-        )  # fmt: skip
+        message = f"{link} and {other} touch at home, where the base is at the origin"
+        hint = "" if compiled.environment.tasks else "give a query: simulations can begin at its start"
+        log.info("KIN312", link, message, hint=hint, span=body.span)
         return
-    log.warn(
-        KinematicsError, "KIN312", link, f"{link} and {other} touch at home",
-        hint="exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch",
-        span=body.span,
-    )  # fmt: skip
+    hint = "exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch"
+    log.warn("KIN312", link, f"{link} and {other} touch at home", hint=hint, span=body.span)

@@ -10,7 +10,7 @@ from typing import NoReturn
 import mujoco
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, Span
+from ..errors import Span
 from ..geometry.assembly import Assembly
 from ..mjcf.compiler import Document
 
@@ -57,10 +57,8 @@ def _compiled(
         return spec().compile()
     except UserWarning as warning:
         said = " ".join(str(warning).split())
-        log.fail(
-            ConversionError, "MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}",
-            hint="correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)",
-        )  # fmt: skip
+        hint = "correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)"
+        log.fail("MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}", hint=hint)
     except ValueError as error:
         _refuse(" ".join(str(error).split()), document, assembly, log)
 
@@ -68,11 +66,9 @@ def _compiled(
 def _refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> NoReturn:
     """Raise MuJoCo's refusal as a `ConversionError` about the body that it concerns."""
     subject, span = _culprit(message, document, assembly)
-    log.fail(
-        ConversionError, "MJC401", subject or document.name,
-        f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {message}",
-        hint="" if span else "this may be a fault of env2mjcf: please report it with the scene", span=span,
-    )  # fmt: skip
+    message = f"MuJoCo {mujoco.__version__} refuses {subject or 'the scene'}: {message}"
+    hint = "" if span else "this may be a fault of env2mjcf: please report it with the scene"
+    log.fail("MJC401", subject or document.name, message, hint=hint, span=span)
 
 
 def _culprit(message: str, document: Document, assembly: Assembly) -> tuple[str, Span | None]:

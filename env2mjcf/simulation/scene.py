@@ -248,12 +248,7 @@ class Scene:
         return self._queries.validities(rows)
 
     def clearance(
-        self,
-        q: ArrayLike,
-        *,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        progress: bool = False,
+        self, q: ArrayLike, *, threads: int | None = None, executor: Executor | None = None, progress: bool = False
     ) -> Any:
         """Return the least distance over the tested pairs, in metres; the boundary is not counted.
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import IO
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError
 from ..options import PathArgument
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -161,10 +160,8 @@ def _said(file: str | os.PathLike[str], code: str) -> Generator[None]:
     except OSError as error:
         path = os.fsdecode(file)
         full = error.errno in _FULL
-        DiagnosticLog().fail(
-            ConversionError, code, path, f"{path} cannot be written: {error.strerror or error}",
-            hint=f"{'make room, or ' if full else ''}choose another file; its folder must exist",
-        )  # fmt: skip
+        hint = f"{'make room, or ' if full else ''}choose another file; its folder must exist"
+        DiagnosticLog().fail(code, path, f"{path} cannot be written: {error.strerror or error}", hint=hint)
 
 
 def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgument] = ()) -> None:
@@ -194,9 +191,7 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
         what = f"lies in {path.parent}, which may not be written"
     else:
         return
-    DiagnosticLog().fail(
-        ConversionError, code, str(path), f"{path} {what}; expected a file to write", hint="name another output"
-    )
+    DiagnosticLog().fail(code, str(path), f"{path} {what}; expected a file to write", hint="name another output")
 
 
 def _against_name(path: Path) -> str:
@@ -235,10 +230,8 @@ def refuse_foreign(out: Path, code: str, kind: str, belongs: Callable[[bytes], b
         if not beginning.strip() or belongs(beginning):
             return
         what = f"is no {kind}"
-    DiagnosticLog().fail(
-        ConversionError, code, str(out), f"{out} {what}, and is not replaced",
-        hint="choose another output, or remove the file",
-    )  # fmt: skip
+    hint = "choose another output, or remove the file"
+    DiagnosticLog().fail(code, str(out), f"{out} {what}, and is not replaced", hint=hint)
 
 
 class NoRegularFileError(OSError):

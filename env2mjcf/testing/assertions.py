@@ -74,11 +74,7 @@ def assert_valid(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | N
 
 
 def assert_valid_path(
-    scene: Scene,
-    path: ArrayLike,
-    resolution: float | None = None,
-    *,
-    picture: str | PathLike[str] | None = None,
+    scene: Scene, path: ArrayLike, resolution: float | None = None, *, picture: str | PathLike[str] | None = None
 ) -> None:
     """Assert that the configurations of a path, and the straight edges between them, are valid.
 

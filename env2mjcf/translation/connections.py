@@ -44,9 +44,13 @@ def _judge_joint(connection: Connection, losses: Losses) -> None:
         return
     if joint is JointType.PRISMATIC:
         losses.lost(
-            "ENV166", joint.value, f"the original planner of dialect {dialect} knows no Prismatic joints; written all "
-            "the same, and read as a slide by env2mjcf", "", connection.span,
-        )  # fmt: skip
+            "ENV166",
+            joint.value,
+            f"the original planner of dialect {dialect} knows no Prismatic joints; written all "
+            "the same, and read as a slide by env2mjcf",
+            "",
+            connection.span,
+        )
         return
     losses.refuse(
         "ENV165",
@@ -64,10 +68,13 @@ def _limits(connection: Connection, losses: Losses) -> tuple[JointLimits, ...]:
     narrow = next((x for x in connection.limits if x != turn), None)
     if narrow is not None:
         losses.lost(
-            "ENV163", connection.joint.value,
+            "ENV163",
+            connection.joint.value,
             f"dialect {losses.dialect} has no limits of joints; {narrow.lower:.6g} to {narrow.upper:.6g} "
-            f"{'' if connection.joint is JointType.PRISMATIC else 'rad '}is lost", "", narrow.span or connection.span,
-        )  # fmt: skip
+            f"{'' if connection.joint is JointType.PRISMATIC else 'rad '}is lost",
+            "",
+            narrow.span or connection.span,
+        )
     return ()
 
 
@@ -77,10 +84,13 @@ def _report_periodic(robot: MultiBody, losses: Losses) -> None:
     hinge = next((c for c in robot.connections if c.joint is JointType.REVOLUTE), None)
     if hinge is not None:
         losses.lost(
-            "ENV164", robot.bodies[hinge.next].filename,
+            "ENV164",
+            robot.bodies[hinge.next].filename,
             f"hinges turn without end in dialect {robot.dialect}; in dialect {losses.dialect} they go from half a turn "
-            "back to half a turn on, and not past it", "every pose is still reached", hinge.span,
-        )  # fmt: skip
+            "back to half a turn on, and not past it",
+            "every pose is still reached",
+            hinge.span,
+        )
 
 
 # Half a turn about x + z: what turned about x turns about z behind it, and the other way round.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NoReturn
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, Span
+from ..errors import Span
 from ..model.dialects import RULES, VOCABULARIES, DialectRules, Vocabulary
 from ..model.environment import Dialect
 
@@ -34,7 +34,7 @@ class Losses:
 
     def lost(self, code: str, subject: str, message: str, hint: str = "", span: Span | None = None) -> None:
         """Report what is left out or changed, while poses of links stay as they are."""
-        self.log.warn(ConversionError, code, subject, message, hint=hint, span=span)
+        self.log.warn(code, subject, message, hint=hint, span=span)
 
     def refuse(self, code: str, subject: str, message: str, hint: str = "", span: Span | None = None) -> NoReturn:
         """Refuse what would move links if it were left out.
@@ -42,4 +42,4 @@ class Losses:
         Raises:
             ConversionError: Always.
         """
-        self.log.fail(ConversionError, code, subject, message, hint=hint, span=span)
+        self.log.fail(code, subject, message, hint=hint, span=span)

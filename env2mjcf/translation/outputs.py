@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, Diagnostic, Env2MjcfError, GeometryError
+from ..errors import Diagnostic, Env2MjcfError
 from ..formats.detect import detect
 from ..formats.env import read_robot
 from ..formats.lexer import Scanner
@@ -90,10 +90,8 @@ def _reads_as(kind: Kind, source: Source) -> bool:
 
 
 def _refuse(output: Output, why: str) -> NoReturn:
-    DiagnosticLog().fail(
-        ConversionError, "ENV190", str(output.path), f"{output.path} {why}, and is not replaced",
-        hint="name another output, or remove the file",
-    )  # fmt: skip
+    hint = "name another output, or remove the file"
+    DiagnosticLog().fail("ENV190", str(output.path), f"{output.path} {why}, and is not replaced", hint=hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,11 +114,7 @@ class Written:
 
 
 def write_environment(
-    environment: Environment,
-    file: PathArgument,
-    *,
-    mesh_dirs: Iterable[PathArgument] = (),
-    allow_outside: bool = False,
+    environment: Environment, file: PathArgument, *, mesh_dirs: Iterable[PathArgument] = (), allow_outside: bool = False
 ) -> Written:
     """Write an environment in its own dialect, all files or, where one cannot be written, none.
 
@@ -145,10 +139,8 @@ def write_environment(
     names = _robot_files(out, len(_apart(environment)))
     query = out.with_suffix(".query") if environment.tasks else None
     if out in (*names, query):
-        log.fail(
-            ConversionError, "ENV179", str(out), f"{out} is what a robot or query beside it is called",
-            hint="name a file that ends in .env",
-        )  # fmt: skip
+        hint = "name a file that ends in .env"
+        log.fail("ENV179", str(out), f"{out} is what a robot or query beside it is called", hint=hint)
     for path in (out, *names, *([query] if query else [])):
         refuse_unwritable(path, "ENV179", environment.sources)
     options = Options.from_keywords({"mesh_dirs": mesh_dirs, "allow_outside": allow_outside})
@@ -190,30 +182,24 @@ def named_from(
         if problem.path is not None:
             found[name] = problem.path
             continue
-        log.warn(
-            GeometryError, problem.code, name, f"{problem.message}; its name stays", hint=problem.hint,
-            span=problem.span,
-        )  # fmt: skip
+        log.warn(problem.code, name, f"{problem.message}; its name stays", hint=problem.hint, span=problem.span)
     names: dict[str, str] = {}
     outside: dict[Path, None] = {}
     here = Path(os.path.realpath(folder))
     for body in (b for m in environment.multibodies for b in m.bodies):
         name = names[body.filename] = _name_from(here, body.filename, found.get(body.filename))
         if len(name.split()) != 1:
-            log.fail(
-                ConversionError, "ENV178", body.filename,
-                f"the file name {name!r} is no single word, as names in text files are",
-                hint="write the environment into another folder, or rename the file", span=body.span,
-            )  # fmt: skip
+            message = f"the file name {name!r} is no single word, as names in text files are"
+            hint = "write the environment into another folder, or rename the file"
+            log.fail("ENV178", body.filename, message, hint=hint, span=body.span)
         if body.filename in found:
             holder = Path(os.path.realpath(found[body.filename])).parent
             if not holder.is_relative_to(here):
                 outside[_shown(holder)] = None
     if outside:
-        log.info(
-            "ENV171", environment.name, f"meshes stay where they are, in {', '.join(map(str, outside))}",
-            hint="read it with mesh_dirs=[...] (--mesh-dirs) or allow_outside=True (--allow-outside)",
-        )  # fmt: skip
+        message = f"meshes stay where they are, in {', '.join(map(str, outside))}"
+        hint = "read it with mesh_dirs=[...] (--mesh-dirs) or allow_outside=True (--allow-outside)"
+        log.info("ENV171", environment.name, message, hint=hint)
     multibodies = tuple(
         replace(m, bodies=tuple(replace(b, filename=names[b.filename]) for b in m.bodies))
         for m in environment.multibodies

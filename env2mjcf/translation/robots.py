@@ -36,9 +36,13 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
     _report_bases(source, losses)
     if source.adjacencies and not losses.vocabulary.adjacencies:
         losses.lost(
-            "ENV172", "Adjacencies", f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
-            "are lost, so that those links are tested", "exclude them with exclude_pairs", source.span,
-        )  # fmt: skip
+            "ENV172",
+            "Adjacencies",
+            f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
+            "are lost, so that those links are tested",
+            "exclude them with exclude_pairs",
+            source.span,
+        )
     if source.actuators:
         losses.lost("ENV177", "<Actuator>", "text files have no actuators; they are lost", "", source.actuators[0].span)
     if source.label is not None:
@@ -107,9 +111,13 @@ def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
         return source if source.moves else replace(source, kind=MultiBodyKind.ACTIVE)
     if source.kind is MultiBodyKind.NON_HOLONOMIC:
         losses.lost(
-            "ENV173", "NonHolonomic", f"dialect {losses.dialect} has no NonHolonomic robots; written as Active, "
-            "without controls and velocity bounds", "", source.span,
-        )  # fmt: skip
+            "ENV173",
+            "NonHolonomic",
+            f"dialect {losses.dialect} has no NonHolonomic robots; written as Active, "
+            "without controls and velocity bounds",
+            "",
+            source.span,
+        )
     return replace(source, kind=MultiBodyKind.ACTIVE, velocity_bounds=None, controls=())
 
 
@@ -117,10 +125,12 @@ def _report_bases(source: MultiBody, losses: Losses) -> None:
     bases = [b for b in source.bodies if b.base is not BaseKind.JOINT]
     if losses.vocabulary.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
         losses.lost(
-            "ENV176", bases[1].filename,
-            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one", "split the robot",
+            "ENV176",
+            bases[1].filename,
+            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one",
+            "split the robot",
             bases[1].span,
-        )  # fmt: skip
+        )
 
 
 def _report_fixed_base(source: MultiBody, losses: Losses) -> None:
@@ -129,9 +139,13 @@ def _report_fixed_base(source: MultiBody, losses: Losses) -> None:
     if before != after and fixed is not None:
         change = "is tested" if after else "is not tested"
         losses.lost(
-            "ENV175", fixed.filename, f"the fixed base {fixed.filename} {change} against obstacles in dialect "
-            f"{losses.dialect}, unlike in dialect {source.dialect}", "", fixed.span,
-        )  # fmt: skip
+            "ENV175",
+            fixed.filename,
+            f"the fixed base {fixed.filename} {change} against obstacles in dialect "
+            f"{losses.dialect}, unlike in dialect {source.dialect}",
+            "",
+            fixed.span,
+        )
 
 
 _WORD = re.compile(r"[^\s#]\S*")
@@ -154,9 +168,13 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     free = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     if base not in (free, BaseKind.FIXED):
         losses.refuse(
-            "ENV167", body.filename, f"a {base.value} base of {body.filename}; in dialect A the first body moves "
-            "freely or is fixed, and all others hang on connections or are fixed", "choose another dialect", body.span,
-        )  # fmt: skip
+            "ENV167",
+            body.filename,
+            f"a {base.value} base of {body.filename}; in dialect A the first body moves "
+            "freely or is fixed, and all others hang on connections or are fixed",
+            "choose another dialect",
+            body.span,
+        )
     # A free base has a pose there, its home; other dialects' free bases are at home at the origin.
     return replace(dressed, base=base, pose=body.pose or Pose() if first or base is BaseKind.FIXED else None)
 
@@ -172,9 +190,12 @@ def _dressed(body: Body, losses: Losses) -> Body:
     name, span, dialect = body.filename, body.span, losses.dialect
     if not _WORD.fullmatch(name):
         losses.refuse(
-            "ENV178", name, f"the file name {name!r} is no single word, as names in text files are",
-            "rename the mesh file", span,
-        )  # fmt: skip
+            "ENV178",
+            name,
+            f"the file name {name!r} is no single word, as names in text files are",
+            "rename the mesh file",
+            span,
+        )
     if body.mass is not None and not losses.vocabulary.mass:
         losses.lost(
             "ENV170", name, f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost", "", span
@@ -184,9 +205,13 @@ def _dressed(body: Body, losses: Losses) -> Body:
         return body
     if body.recentring is not Recentring.COM:
         losses.refuse(
-            "ENV169", name, f"{name} is not to be moved to the mean of its vertices ({body.recentring.value}); dialect "
-            f"{dialect} always does", "move the mean of its vertices into the origin, or choose dialect D or E", span,
-        )  # fmt: skip
+            "ENV169",
+            name,
+            f"{name} is not to be moved to the mean of its vertices ({body.recentring.value}); dialect "
+            f"{dialect} always does",
+            "move the mean of its vertices into the origin, or choose dialect D or E",
+            span,
+        )
     return _without_paint(body, losses)
 
 
@@ -208,7 +233,9 @@ def _report_home(body: Body, base: BaseKind, losses: Losses) -> None:
     if base in (BaseKind.FIXED, BaseKind.JOINT) or body.pose is None or body.pose == Pose():
         return
     losses.lost(
-        "ENV168", body.filename,
+        "ENV168",
+        body.filename,
         f"dialect {losses.dialect} has no pose for a free base: {body.filename} is at home at the origin there",
-        "a query file holds where the robot starts", body.pose.span or body.span,
-    )  # fmt: skip
+        "a query file holds where the robot starts",
+        body.pose.span or body.span,
+    )

@@ -39,10 +39,10 @@ def boundary(environment: Environment, losses: Losses) -> Boundary | None:
     if fitting.shape in losses.vocabulary.boundaries and not flat_ball:
         return fitting
     if not losses.vocabulary.boundaries:
+        message = "its planner takes one on the command line or in XML"
         losses.lost(
-            "ENV160", "Boundary", f"dialect {dialect} has no boundary in its file; it is lost",
-            "its planner takes one on the command line or in XML", found.span,
-        )  # fmt: skip
+            "ENV160", "Boundary", f"dialect {dialect} has no boundary in its file; it is lost", message, found.span
+        )
         return None
     losses.lost(
         "ENV160", "Boundary", f"dialect {dialect} has no {found.shape.value}; the boundary is lost", "", found.span
@@ -82,10 +82,11 @@ def _wide(environment: Environment, losses: Losses) -> Boundary:
     longest = max((abs(x) for x in _lengths(environment)), default=0.0)
     half = max(_WIDE, 10.0 ** math.ceil(math.log10(1000 * longest))) if longest > 0 else _WIDE
     losses.lost(
-        "ENV161", "Boundary", f"dialect {losses.dialect} must have a boundary; written as a box from {-half:g} "
-        f"to {half:g}",
+        "ENV161",
+        "Boundary",
+        f"dialect {losses.dialect} must have a boundary; written as a box from {-half:g} to {half:g}",
         "give the boundary that is meant: boundary=Boundary(...) (--box X0 X1 Y0 Y1 Z0 Z1)",
-    )  # fmt: skip
+    )
     return Boundary(BoundaryShape.BOX, (-half,) * 3, (half,) * 3)
 
 

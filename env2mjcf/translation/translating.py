@@ -130,9 +130,12 @@ def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
         )
         return []
     losses.lost(
-        "ENV174", name, f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an "
-        "obstacle", "", source.span,
-    )  # fmt: skip
+        "ENV174",
+        name,
+        f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an obstacle",
+        "",
+        source.span,
+    )
     return list(translate_obstacles(source, losses))
 
 
@@ -141,15 +144,18 @@ def _report_number(environment: Environment, losses: Losses) -> None:
         return
     robots = environment.robots
     if not robots and environment.multibodies:
+        message = "add a robot, with robots=[...] (--robots) if it has a file of its own"
         losses.refuse(
-            "ENV176", environment.name, "a scene without robot: dialect A takes its first multibody for one",
-            "add a robot, with robots=[...] (--robots) if it has a file of its own",
-        )  # fmt: skip
+            "ENV176", environment.name, "a scene without robot: dialect A takes its first multibody for one", message
+        )
     if len(robots) > 1:
         losses.lost(
-            "ENV176", environment.name, f"{len(robots)} robots; the planner of dialect A moves the first only, and "
-            "takes the others for obstacles", "", robots[1].span,
-        )  # fmt: skip
+            "ENV176",
+            environment.name,
+            f"{len(robots)} robots; the planner of dialect A moves the first only, and takes the others for obstacles",
+            "",
+            robots[1].span,
+        )
 
 
 def _report_xml(environment: Environment, losses: Losses) -> None:
@@ -160,6 +166,8 @@ def _report_xml(environment: Environment, losses: Losses) -> None:
     # One link apart is the default.
     if rules.ignore_self_collision or rules.adjacent_links not in (None, 1):
         losses.lost(
-            "ENV177", environment.name, "text files do not say which pairs of links are tested; what the problem "
-            "file says about that is lost", "choose with adjacent_links and self_collision",
-        )  # fmt: skip
+            "ENV177",
+            environment.name,
+            "text files do not say which pairs of links are tested; what the problem file says about that is lost",
+            "choose with adjacent_links and self_collision",
+        )

@@ -87,12 +87,7 @@ class Arrows:
     def described(self) -> dict[str, Any]:
         """Return the mark in terms of JSON."""
         directions = _triples("directions", self.directions).tolist()
-        return {
-            "kind": "arrows",
-            **_described(self.points, self.color),
-            "directions": directions,
-            "size": self.length,
-        }
+        return {"kind": "arrows", **_described(self.points, self.color), "directions": directions, "size": self.length}
 
 
 Mark = Polyline | Points | Arrows

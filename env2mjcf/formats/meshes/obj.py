@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...diagnostics import DiagnosticLog
-from ...errors import GeometryError, Span
+from ...errors import Span
 from ...limits import Limits
 from .numbers import find_numbers, span_of
 from .text import MeshArrays, NumberFile, as_bytes, faces_of
@@ -61,7 +61,6 @@ class _Rows(NumberFile):
         self.counts = np.bincount(self.row, minlength=len(extents)).astype(np.int64)
         if len(self.row) > 3 * limits.mesh_elements:
             log.fail(
-                GeometryError,
                 "GEO209",
                 path,
                 f"{path} has {len(self.row)} numbers; at most {limits.mesh_elements} vertices or corners are read",
@@ -102,7 +101,7 @@ def read_obj(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     if b"\0" in whole:
         at = whole.index(b"\0")
         message = f"{path} is not a text file: it holds a NUL byte"
-        log.fail(GeometryError, "GEO211", path, message, span=span_of(path, whole, at, at + 1))
+        log.fail("GEO211", path, message, span=span_of(path, whole, at, at + 1))
     plain = _plain(whole)
     extents: dict[bytes, list[tuple[int, int]]] = {b"v": [], b"f": []}
     vertices_before: list[int] = []
@@ -118,7 +117,7 @@ def read_obj(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     if unknown is not None:
         found = whole[unknown[0] : unknown[1]][:40].decode("utf-8", "replace")
         message = f"lines that begin with {found!r} are not read; only vertices `v` and faces `f` are"
-        log.warn(GeometryError, "GEO225", path, message, span=span_of(path, whole, *unknown))
+        log.warn("GEO225", path, message, span=span_of(path, whole, *unknown))
     rows = {k: _Rows(x, plain, whole, path=path, log=log, limits=limits) for k, x in extents.items()}
     vertices = _vertices(rows[b"v"])
     return vertices, _faces(rows[b"f"], np.array(vertices_before, dtype=np.int64), vertices)
@@ -136,13 +135,13 @@ def _plain(whole: bytes) -> bytes:
 def _vertices(rows: _Rows) -> NDArray[np.float64]:
     if not len(rows.counts):
         message = f"{rows.path} has no vertices; expected lines `v x y z`"
-        rows.log.fail(GeometryError, "GEO210", rows.path, message)
+        rows.log.fail("GEO210", rows.path, message)
     rows.need(len(rows.row), lambda token: f"a coordinate of vertex {rows.row[token] + 1}")
     short = np.flatnonzero(rows.counts < 3)
     if short.size:
         row = int(short[0])
         message = f"vertex {row + 1} has {rows.counts[row]} coordinates; expected x y z"
-        rows.log.fail(GeometryError, "GEO213", rows.path, message, span=rows.row_span(row))
+        rows.log.fail("GEO213", rows.path, message, span=rows.row_span(row))
     # What follows x, y and z is a weight or a colour.
     first = np.cumsum(rows.counts) - rows.counts
     return rows.numbers.values[first[:, None] + np.arange(3)]
@@ -150,7 +149,7 @@ def _vertices(rows: _Rows) -> NDArray[np.float64]:
 
 def _faces(rows: _Rows, vertices_before: NDArray[np.int64], vertices: NDArray[np.float64]) -> NDArray[np.int64]:
     if not len(rows.counts):
-        rows.log.fail(GeometryError, "GEO210", rows.path, f"{rows.path} has no faces; expected lines `f 1 2 3`")
+        rows.log.fail("GEO210", rows.path, f"{rows.path} has no faces; expected lines `f 1 2 3`")
 
     def what(token: int) -> str:
         return f"a corner of face {rows.row[token] + 1}"
@@ -167,7 +166,6 @@ def _faces(rows: _Rows, vertices_before: NDArray[np.int64], vertices: NDArray[np
     negative = np.flatnonzero(indices < 0)
     if negative.size:
         rows.log.warn(
-            GeometryError,
             "GEO224",
             rows.path,
             "negative indices count back from the last vertex; the original planner does not read them",

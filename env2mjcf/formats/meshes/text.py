@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...diagnostics import DiagnosticLog
-from ...errors import GeometryError, Span
+from ...errors import Span
 from ...limits import Limits, TooMuchWorkError, Work
 from ..lexer import number_hint
 from .numbers import Numbers, find_numbers, span_of
@@ -56,7 +56,7 @@ class NumberFile:
 
     def fail(self, code: str, token: int, message: str, hint: str = "") -> NoReturn:
         """Raise a `GeometryError` at a token."""
-        self.log.fail(GeometryError, code, self.path, message, hint=hint, span=self.span(token))
+        self.log.fail(code, self.path, message, hint=hint, span=self.span(token))
 
     def need(self, token: int, what: Callable[[int], str]) -> None:
         """Make sure that the tokens in front of `token` are there and are numbers.
@@ -151,15 +151,14 @@ def faces_of(
         worst = int(counts.argmax())
         message = f"a polygon has {counts[worst]} corners; at most {limits.polygon_corners} are read"
         hint = f"triangulate the mesh, or {Limits.hint('polygon_corners')}"
-        log.fail(GeometryError, "GEO227", path, message, hint=hint, span=place(worst))
+        log.fail("GEO227", path, message, hint=hint, span=place(worst))
     small = np.flatnonzero(counts < 3)
     if small.size:
         message = f"{small.size} of {counts.size} polygons have fewer than three corners; skipped"
-        log.warn(GeometryError, "GEO221", path, message, span=place(int(small[0])))
+        log.warn("GEO221", path, message, span=place(int(small[0])))
     large = np.flatnonzero(counts > 3)
     if large.size:
         log.warn(
-            GeometryError,
             "GEO220",
             path,
             f"{large.size} of {counts.size} polygons have more than three corners; cut into triangles, where the "
@@ -169,7 +168,7 @@ def faces_of(
         )
     kept = np.flatnonzero(counts >= 3)
     if not kept.size:
-        log.fail(GeometryError, "GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
+        log.fail("GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
     try:
         faces, crossing = triangulate(
             vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], Work(limits.polygon_work)
@@ -177,7 +176,6 @@ def faces_of(
     except TooMuchWorkError as stopped:
         worst = int(kept[stopped.part])
         log.fail(
-            GeometryError,
             "GEO270",
             path,
             f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have to "
@@ -187,7 +185,7 @@ def faces_of(
         )
     if crossing:
         message = f"{len(crossing)} polygons cross themselves; what they enclose is a guess"
-        log.warn(GeometryError, "GEO222", path, message, span=place(int(kept[crossing[0]])))
+        log.warn("GEO222", path, message, span=place(int(kept[crossing[0]])))
     return faces
 
 

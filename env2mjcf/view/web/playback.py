@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ...diagnostics import DiagnosticLog
-from ...errors import FormatError
 from ...kinematics.transforms import Array
 from ...simulation.scene import Scene
 from ..trails import fine, lengths
@@ -68,18 +67,17 @@ class Track:
 def doubts(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:
     """Report what is doubtful about a path, (k, dim), that somebody wants to see."""
     if len(q) == 1:
-        log.warn(FormatError, "CFG551", file, f"{file} holds one configuration; expected a path of two at least")
+        log.warn("CFG551", file, f"{file} holds one configuration; expected a path of two at least")
     broken = scene.space.broken(q)
     if not broken.any():
         return
     row, i = (int(x) for x in np.argwhere(broken)[0])
     number, lower, upper = (scene.space.encode(v)[i] for v in (q[row], scene.space.lower, scene.space.upper))
-    log.warn(
-        FormatError, "CFG550", file,
+    message = (
         f"{int(broken.any(axis=1).sum())} of {len(q)} configurations of {file} are beyond the limits; in number "
-        f"{row + 1} {scene.space.names[i]} is {number:.6g}, its limits are {lower:.6g} to {upper:.6g}",
-        hint="are its numbers in the units of the scene's file?",
-    )  # fmt: skip
+        f"{row + 1} {scene.space.names[i]} is {number:.6g}, its limits are {lower:.6g} to {upper:.6g}"
+    )
+    log.warn("CFG550", file, message, hint="are its numbers in the units of the scene's file?")
 
 
 class Player:
