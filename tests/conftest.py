@@ -12,7 +12,7 @@ from texts import read, read_robot  # noqa: F401  fixtures
 
 # What is hidden from this process is hidden from its children too.
 if os.environ.get("ENV2MJCF_TEST_WITHOUT"):
-    _hiding = Path(__file__).with_name("without")
+    _hiding = Path(__file__).parent / "support" / "without"
     runpy.run_path(str(_hiding / "sitecustomize.py"))
     os.environ["PYTHONPATH"] = os.pathsep.join(p for p in (str(_hiding), os.environ.get("PYTHONPATH", "")) if p)
 

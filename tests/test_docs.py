@@ -38,7 +38,7 @@ def follow(page: Path, folder: Path) -> None:
     """Run a page's examples in a folder, in a process of their own, and fail with what differs."""
     for extra in EXTRAS.get(page.name, ()):
         skip_without(extra)
-    words = [sys.executable, str(ROOT / "tests" / "snippets.py"), str(page)]
+    words = [sys.executable, str(ROOT / "tests/support/snippets.py"), str(page)]
     # Whatever make thinks, it must not install the clone into the environment that it only borrows.
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MAKEFLAGS": "PIP=true"}
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)

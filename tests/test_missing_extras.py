@@ -17,7 +17,7 @@ import numpy as np
 from extras import PACKAGES
 from scenes import MODELS
 
-HIDING = Path(__file__).with_name("without")
+HIDING = Path(__file__).parent / "support" / "without"
 EVERYTHING = tuple(name for names in PACKAGES.values() for name in names)
 SEED, MAZE, BUG_TRAP = (str(MODELS / p) for p in ("seed/seed.env", "maze/maze.xml", "bug-trap/bug-trap.env"))
 NEEDS = {

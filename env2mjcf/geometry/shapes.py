@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import GeometryError, Span
+from ..errors import Span
 from ..limits import Work
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
@@ -119,7 +119,7 @@ def _report_omission(shape: CollisionShape, log: DiagnosticLog, subject: str, sp
     message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
     hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
     report = log.warn if shape.pieces else log.fail
-    report(GeometryError, "GEO241", subject, message, hint=hint, span=span)
+    report("GEO241", subject, message, hint=hint, span=span)
 
 
 def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-MODELS = Path(__file__).parent.parent / "models"
+MODELS = Path(__file__).parents[2] / "models"
 
 CUBE_FACES = "1 3 -2\n1 4 -3\n5 6 -7\n5 7 -8\n1 2 -6\n1 6 -5\n2 3 -7\n2 7 -6\n3 4 -8\n3 8 -7\n4 1 -5\n4 5 -8\n"
 

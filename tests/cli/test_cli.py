@@ -20,7 +20,7 @@ from env2mjcf.cli.main import VERBS, main
 from env2mjcf.cli.printing import format_diagnostic, one_line, plain
 from env2mjcf.errors import Diagnostic, Severity, Span
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"
 
 # A cube with edges of 1, and outward faces.

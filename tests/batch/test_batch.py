@@ -19,7 +19,7 @@ from env2mjcf.batch import run
 from env2mjcf.batch import runner as running_module
 from env2mjcf.cli.main import main
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

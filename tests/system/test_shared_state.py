@@ -30,7 +30,7 @@ import env2mjcf
 from env2mjcf.planning import plan
 from env2mjcf.view import offscreen, picture
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 ALPHA = MODELS / "alpha" / "alpha.env"
 
 # All that changes in modules while they are used, and why that may be.

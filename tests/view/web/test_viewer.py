@@ -27,7 +27,7 @@ from env2mjcf.view.web.playback import Player, Track
 from env2mjcf.view.web.sliders import Dials
 from env2mjcf.view.web.viewer import Viewer
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 NOTHING = np.zeros((0, 6))
 
 

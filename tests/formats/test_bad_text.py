@@ -20,7 +20,7 @@ from env2mjcf.formats.rows import read_query
 from env2mjcf.formats.source import Source
 from env2mjcf.model.environment import Environment
 
-MODELS = sorted((Path(__file__).parents[1] / "models").glob("*/*.env"))
+MODELS = sorted((Path(__file__).parents[2] / "models").glob("*/*.env"))
 TOKEN = re.compile(r"\S+\s*")
 PIECE = re.compile(r"[^\s\"'<>;:\[\]()]+|\s+|.")
 SLOWEST = 10.0

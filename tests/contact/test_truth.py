@@ -17,7 +17,7 @@ import env2mjcf
 
 pytest.importorskip("fcl", reason="no python-fcl to compare with")
 
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 import verdicts
 from table import Case, corpus_cases

@@ -29,7 +29,7 @@ from env2mjcf.planning.planner_space import PlanningSpace, Validity
 from env2mjcf.planning.result import Progress
 from env2mjcf.planning.segment import shortened
 
-MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[2] / "models"
 MAZE = MODELS / "maze" / "maze.xml"
 
 # A cube with edges of 1.

@@ -24,7 +24,7 @@ import env2mjcf
 from env2mjcf.contact import executors as remote
 from env2mjcf.contact.tasks import Chunks
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ import pytest
 from extras import skip_without
 from interrupting import heed
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 # Drawn in software, without a screen, and without asking anybody for anything.
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",

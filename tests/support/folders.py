@@ -21,7 +21,7 @@ from scenes import box_mesh, free_cube, write_scene
 import env2mjcf
 from env2mjcf.cli.main import main
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 FOREIGN = {"notes.txt": b"mine", "assets/mine.stl": b"\0\1", "assets/cube-0123456789ab.stl": b"mine, too"}
 _STAGED = re.compile(r"(assets/)?\.[^/]*[0-9a-f]{16}[^/]*")

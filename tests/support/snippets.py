@@ -1,4 +1,4 @@
-"""Runs the examples of a page of the documentation, as a reader would: `python tests/snippets.py PAGE`, in a copy.
+"""Runs the examples of a page of the documentation, as a reader would: `python tests/support/snippets.py PAGE`, in a copy.
 
 From top to bottom, in the current folder:
 
@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 RUN, SHOWN = ("python", "console"), ("text", "xml", "toml", "yaml")
 FENCE = re.compile(r"^(?P<fence>```+)(?P<language>[^\n`]*)\n(?P<body>.*?)^(?P=fence)\n", re.MULTILINE | re.DOTALL)
 REASON = re.compile(r"<!-- not run: .+ -->\n+\Z")
