@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_hostile import CUBE, fault
+from scenes import box_mesh, fault
 
 import env2mjcf
 from env2mjcf.cli.main import main
@@ -31,7 +31,7 @@ def chain(links: int, limits: str = "-1:1") -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "cube.g").write_text(CUBE)
+    (tmp_path / "cube.g").write_text(box_mesh(0.5, 0.5, 0.5))
     return tmp_path
 
 

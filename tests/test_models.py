@@ -10,24 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scenes import SCENES
 
 import env2mjcf
 
 MODELS = Path(__file__).parents[1] / "models"
 MESHES = sorted(MODELS.glob("*/**/*.g"))
-SCENES = {
-    "seed/seed.env": {"query": "seed/seed.query"},
-    "gantry/gantry.env": {"query": "gantry/gantry.query"},
-    "bug-trap/bug-trap.env": {"query": "bug-trap/bug-trap.query"},
-    "spherical-arm/spherical-arm.env": {"query": "spherical-arm/spherical-arm.query"},
-    "closed-chain/closed-chain.env": {"query": "closed-chain/closed-chain.query"},
-    "alpha/alpha.env": {"query": "alpha/alpha.query"},
-    "two-robots/two-robots.env": {"query": "two-robots/two-robots.query"},
-    "maze/maze.env": {"robots": ["maze/maze.robot"], "query": "maze/maze.query"},
-    "maze/maze.xml": {},
-    "xml-arm/xml-arm.xml": {},
-    "xml-arm/xml-arm-environment.xml": {"robots": ["xml-arm/xml-arm-robot.xml"]},
-}
 DIALECTS_AND_DOFS = {
     "seed": ("A", [9]),
     "gantry": ("A", [4]),

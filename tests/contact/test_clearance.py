@@ -9,8 +9,7 @@ import pytest
 import trimesh
 from distances import surface_distances
 from real_scenes import real_scene, scene_names
-from scenes import MODELS, box_mesh, free_cube, write_scene
-from test_scene import notched_block
+from scenes import MODELS, box_mesh, free_cube, notched_block, write_scene
 
 import env2mjcf
 from env2mjcf.contact.edges import certified

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scenes import fault
 
 import env2mjcf
 from env2mjcf.companions.arrays import open_source
@@ -52,12 +53,6 @@ def passive(inside: str) -> str:
 
 def many_attributes(count: int) -> str:
     return "".join(f' a{i}=""' for i in range(count))
-
-
-def fault(read: Callable[[], object]) -> Env2MjcfError:
-    with pytest.raises(Env2MjcfError) as caught:
-        read()
-    return caught.value
 
 
 class Reader:

@@ -9,10 +9,9 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshes import box, channel, corpus_meshes, joined, moved, rotation, turned
+from meshes import assert_surface_stays, box, channel, codes, corpus_meshes, joined, moved, rotation, turned
 from scenes import box_mesh, free_cube, write_scene
-from test_repair import assert_surface_stays, codes
-from test_solid import assert_inside_and_covering, crossing_prism, height, lined, shelled
+from solids import assert_inside_and_covering, crossing_prism, height, lined, shelled
 
 import env2mjcf
 from env2mjcf.geometry import folds

@@ -8,13 +8,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scenes import MODELS, free_cube, write_scene
+from scenes import MODEL_FILES, MODELS, free_cube, write_scene
 
 import env2mjcf
-
-MODEL_FILES = sorted(
-    [p for p in MODELS.glob("*/*.env") if p.stem != "maze"] + [MODELS / "maze/maze.xml", MODELS / "xml-arm/xml-arm.xml"]
-)
 
 
 @pytest.fixture(params=MODEL_FILES, ids=lambda p: p.stem)

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from lxml import etree
 from mjcf_schema import assert_known_to_mujoco
-from scenes import MODELS, box_mesh, free_cube, write_scene
-from test_space import MODEL_FILES
+from scenes import MODEL_FILES, MODELS, box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.kinematics.forward import RobotKinematics

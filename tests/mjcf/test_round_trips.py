@@ -18,8 +18,7 @@ import mujoco
 import numpy as np
 import pytest
 from real_scenes import real_scene, scene_names
-from scenes import box_mesh, free_cube, write_scene
-from test_models import MODELS, SCENES
+from scenes import MODELS, SCENES, box_mesh, free_cube, write_scene
 
 import env2mjcf
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scenes import box_mesh, free_cube, write_scene
+from scenes import box_mesh, free_cube, notched_block, write_scene
 
 import env2mjcf
 
@@ -119,22 +119,6 @@ def test_a_body_inside_a_hollow_one_is_seen_by_auto_and_not_by_surface(tmp_path:
     contact = auto.contacts(inside)
     assert [(c.link, c.other) for c in contact] == [("small", "block")]
     assert contact[0].distance < 0
-
-
-def notched_block() -> str:
-    """A 2 x 2 x 2 block with a groove of 1 x 2 x 0.75 along y in its top, as one closed mesh."""
-    profile = [(-1, -1), (1, -1), (1, 1), (0.5, 1), (0.5, 0.25), (-0.5, 0.25), (-0.5, 1), (-1, 1)]
-    n = len(profile)
-    vertices = [(x, -1.0, z) for x, z in profile] + [(x, 1.0, z) for x, z in profile]
-    front = [(0, 1, 4), (0, 4, 5), (1, 2, 3), (1, 3, 4), (0, 5, 6), (0, 6, 7)]
-    faces = list(front) + [(a + n, c + n, b + n) for a, b, c in front]
-    for i in range(n):
-        j = (i + 1) % n
-        faces += [(i, j + n, j), (i, i + n, j + n)]
-    lines = [f"1 {2 * n} {len(faces)} {3 * len(faces)}", f"1 {len(faces)}"]
-    lines += [" ".join(map(str, v)) for v in vertices]
-    lines += [f"{a + 1} {b + 1} -{c + 1}" for a, b, c in faces]
-    return "\n".join(lines) + "\n"
 
 
 def notch_mean() -> float:

@@ -9,9 +9,10 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.diagnostics import CATALOGUE, DiagnosticLog
 from env2mjcf.errors import GeometryError
 from env2mjcf.geometry.mesh import Mesh, load_mesh
+from env2mjcf.geometry.repair import repair_diagnostics, repaired
 from env2mjcf.limits import Limits
 
 Floats = NDArray[np.float64]
@@ -130,3 +131,32 @@ def table(width: float, depth: float, height: float, thickness: float) -> trimes
     filled[:, :, 1] = True
     filled[::2, ::2, 0] = True
     return voxels([across(width), across(depth), np.array([0, height - thickness, height])], filled)
+
+
+def codes(mesh: Mesh) -> set[str]:
+    log = DiagnosticLog()
+    repair_diagnostics(mesh, repaired(mesh), log)
+    assert all(d.code in CATALOGUE for d in log)
+    return {d.code for d in log}
+
+
+def assert_surface_stays(mesh: Mesh) -> None:
+    a = repaired(mesh).analysis
+    whole = mesh.faces[(np.diff(np.sort(mesh.faces, axis=1), axis=1) > 0).all(axis=1)]
+    areas = np.cross(*(mesh.vertices[whole[:, i]] - mesh.vertices[whole[:, 0]] for i in (1, 2)))
+    whole = whole[np.linalg.norm(areas, axis=1) > 1e-7 * mesh.diagonal**2]
+    assert farthest(samples(mesh.vertices, whole), a.vertices, a.faces) <= 2e-9 * mesh.diagonal
+    assert farthest(samples(a.vertices, a.faces), mesh.vertices, whole) <= 2e-9 * mesh.diagonal
+
+
+def farthest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Greatest distance of points from a surface, by trimesh."""
+    surface = trimesh.Trimesh(vertices, faces, process=False)
+    return float(np.abs(trimesh.proximity.closest_point_naive(surface, points)[1]).max())
+
+
+def samples(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), size=(len(faces), 3))
+    return np.concatenate(
+        [vertices[np.unique(faces)], np.einsum("fsk,fkj->fsj", weights, vertices[faces]).reshape(-1, 3)]
+    )

@@ -6,6 +6,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
+from env2mjcf.errors import Env2MjcfError
+
 MODELS = Path(__file__).parents[2] / "models"
 
 CUBE_FACES = "1 3 -2\n1 4 -3\n5 6 -7\n5 7 -8\n1 2 -6\n1 6 -5\n2 3 -7\n2 7 -6\n3 4 -8\n3 8 -7\n4 1 -5\n4 5 -8\n"
@@ -55,3 +59,45 @@ def without_privileges(folder: Path, call: Callable[[], object]) -> str:
     os.close(write_end)
     os.waitpid(child, 0)
     return os.read(read_end, 10_000).decode()
+
+
+def notched_block() -> str:
+    """A 2 x 2 x 2 block with a groove of 1 x 2 x 0.75 along y in its top, as one closed mesh."""
+    profile = [(-1, -1), (1, -1), (1, 1), (0.5, 1), (0.5, 0.25), (-0.5, 0.25), (-0.5, 1), (-1, 1)]
+    n = len(profile)
+    vertices = [(x, -1.0, z) for x, z in profile] + [(x, 1.0, z) for x, z in profile]
+    front = [(0, 1, 4), (0, 4, 5), (1, 2, 3), (1, 3, 4), (0, 5, 6), (0, 6, 7)]
+    faces = list(front) + [(a + n, c + n, b + n) for a, b, c in front]
+    for i in range(n):
+        j = (i + 1) % n
+        faces += [(i, j + n, j), (i, i + n, j + n)]
+    lines = [f"1 {2 * n} {len(faces)} {3 * len(faces)}", f"1 {len(faces)}"]
+    lines += [" ".join(map(str, v)) for v in vertices]
+    lines += [f"{a + 1} {b + 1} -{c + 1}" for a, b, c in faces]
+    return "\n".join(lines) + "\n"
+
+
+MODEL_FILES = sorted(
+    [p for p in MODELS.glob("*/*.env") if p.stem != "maze"] + [MODELS / "maze/maze.xml", MODELS / "xml-arm/xml-arm.xml"]
+)
+
+
+def fault(read: Callable[[], object]) -> Env2MjcfError:
+    with pytest.raises(Env2MjcfError) as caught:
+        read()
+    return caught.value
+
+
+SCENES = {
+    "seed/seed.env": {"query": "seed/seed.query"},
+    "gantry/gantry.env": {"query": "gantry/gantry.query"},
+    "bug-trap/bug-trap.env": {"query": "bug-trap/bug-trap.query"},
+    "spherical-arm/spherical-arm.env": {"query": "spherical-arm/spherical-arm.query"},
+    "closed-chain/closed-chain.env": {"query": "closed-chain/closed-chain.query"},
+    "alpha/alpha.env": {"query": "alpha/alpha.query"},
+    "two-robots/two-robots.env": {"query": "two-robots/two-robots.query"},
+    "maze/maze.env": {"robots": ["maze/maze.robot"], "query": "maze/maze.query"},
+    "maze/maze.xml": {},
+    "xml-arm/xml-arm.xml": {},
+    "xml-arm/xml-arm-environment.xml": {"robots": ["xml-arm/xml-arm-robot.xml"]},
+}

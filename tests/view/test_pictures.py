@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from cameras import projected
 from real_scenes import real_scene, scene_names
-from scenes import MODELS, free_cube, write_scene
-from test_models import SCENES
+from scenes import MODELS, SCENES, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.view import Direction, Points, Polyline, offscreen, picture, segmentation
