@@ -55,6 +55,7 @@ def scenes(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow_but("check nothing")
 @pytest.mark.parametrize("words", CASES)
 def test_without_stderr_a_verb_works_and_keeps_its_status(words: str, scenes: Path) -> None:
     for before in (full(2), closed(2)):

@@ -68,6 +68,7 @@ def test_every_query_has_the_answers_of_one_thread(client: Any, scene: env2mjcf.
     )
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_verdict(client: Any, scene: env2mjcf.Scene) -> None:
     before = pids(client)
     assert len(before) == 2

@@ -53,6 +53,7 @@ scene = env2mjcf.load(sys.argv[2], engine="mujoco")
 """
 
 
+@pytest.mark.slow_but("compiled-1", "exit-2")
 @pytest.mark.parametrize("threads", ["1", "2"])
 @pytest.mark.parametrize("code", [ENDLESS, COMPILED, AT_EXIT], ids=["endless", "compiled", "at exit"])
 def test_the_interpreter_ends_while_a_daemon_thread_asks(code: str, threads: str, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from real_scenes import real_scene, scene_names
+from real_scenes import FEW, real_scene, scene_names
 from scenes import MODELS, SCENES, box_mesh, free_cube, write_scene
 
 import env2mjcf
@@ -325,6 +325,7 @@ def test_two_of_one_scene_stand_side_by_side() -> None:
     np.testing.assert_allclose(two.poses[:, 1], one.poses[:, 1], atol=1e-12)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names())
 def test_a_real_scene_survives_mujocos_writer(corpus: Path, tmp_path: Path, name: str) -> None:
     real = real_scene(name)

@@ -194,6 +194,7 @@ def test_many_motions_are_judged_as_each_of_them_is(maze: env2mjcf.Scene):
     assert together.motions == alone.motions == 200
 
 
+@pytest.mark.slow
 def test_the_bug_gets_out_of_its_bottle():
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
     start, goal = scene.queries[0].q
@@ -465,6 +466,7 @@ def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["RRTConnect", "PRM"])
 def test_the_collector_may_run_at_any_time(planner: str, room: Path):
     """Freed memory is filled, so that whoever looks at it crashes."""

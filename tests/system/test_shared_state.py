@@ -270,6 +270,7 @@ print(env2mjcf.write_path(scene, q, Path(sys.argv[2]) / "a.path").read_text())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("localedef"), reason="localedef, which makes locales, is not installed")
 def test_commas_of_a_locale_are_not_read_or_written(tmp_path: Path) -> None:
     """A process that has set a German locale, for MuJoCo's own reading of numbers, too."""

@@ -40,6 +40,7 @@ def rows(scene: env2mjcf.Scene, count: int, seed: int) -> np.ndarray:
 
 @needs_numba
 class TestVerdicts:
+    @pytest.mark.slow_but("alpha", "bug-trap")
     def test_are_those_of_the_triangles(self, model: env2mjcf.Scene) -> None:
         truth = Truth(model)
         q = np.concatenate([rows(model, 100, 1), bisected(model, truth, 30, 40, seed=2)])
@@ -149,6 +150,7 @@ class TestClearance:
         # Depths are searched for in numpy, which takes its time.
         assert (model.clearance(q[hits][:6]) <= 0).all()
 
+    @pytest.mark.slow_but("gantry", "maze", "spherical")
     def test_of_a_row_does_not_depend_on_the_others(self, model: env2mjcf.Scene) -> None:
         q = rows(model, 40, 17)
         q = q[np.argsort(~model.in_collision(q), kind="stable")][:6]

@@ -69,6 +69,7 @@ def test_cells_of_model_meshes_stay_inside_and_cover_the_surface(name: str) -> N
     assert_inside_and_covering(loaded(MODELS / name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CORPUS_MESHES)
 def test_cells_of_real_meshes_stay_inside_and_cover_the_surface(corpus: Path, name: str) -> None:
     mesh = next(m for m in corpus_meshes(corpus) if m.path.name == name)
@@ -225,6 +226,7 @@ def test_every_piece_compiles_in_mujoco(name: str) -> None:
     assert_compiles(lined(MESHES[name])[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CORPUS_MESHES)
 def test_every_piece_of_real_meshes_compiles_in_mujoco(corpus: Path, name: str) -> None:
     assert_compiles(lined(next(m for m in corpus_meshes(corpus) if m.path.name == name))[0])
