@@ -40,7 +40,7 @@ docs: $(VENV)/docs.stamp  ## build the site into docs/_build/html; a warning is 
 wheel: $(VENV)/demo.stamp  ## build the wheel into dist/
 	$(PIP) wheel --no-deps --wheel-dir dist .
 
-tables: $(VENV)/dev.stamp  ## make the tables of README.md, benchmarks/ and docs/ anew
+tables: $(VENV)/demo.stamp  ## make the tables of README.md, benchmarks/ and docs/ anew
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python docs/diagnostics.py
 	$(BIN)/python docs/figures/connection.py
