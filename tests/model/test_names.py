@@ -229,9 +229,9 @@ def test_what_libraries_say_is_no_command_either() -> None:
 
 
 def test_a_name_on_the_page_is_text(stem: str) -> None:
-    shown = wording.text(stem)
+    shown = wording.as_text(stem)
     assert not set("<>\"'") & set(shown)
-    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), wording.label(mesh_stem(f"{stem}.g")))
+    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), wording.as_label(mesh_stem(f"{stem}.g")))
 
 
 # Texts.
