@@ -120,6 +120,7 @@ def test_other_signals_end_it_as_tidily(number: signal.Signals, tmp_path: Path) 
     assert list((tmp_path / "made").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_nohup_ignores_stays_ignored(tmp_path: Path) -> None:
     interrupting.prepare(tmp_path)
     (tmp_path / "first").mkdir()

@@ -110,6 +110,7 @@ def test_with_hulls_the_hulls_are_measured(tmp_path: Path) -> None:
     assert auto.clearance(above) == pytest.approx(np.hypot(0.3, 0.4), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_push_as_long_as_the_depth_separates_and_a_much_shorter_one_does_not(tmp_path: Path) -> None:
     """The depth bounds the shortest translation that separates; 300 directions come near to that one."""
     path = write_scene(tmp_path, free_cube("block.g 0 0 0 0 0 0", robot=FLYER),

@@ -266,11 +266,13 @@ def original(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return written(scene, tmp_path_factory.mktemp("scene"), 200)
 
 
+@pytest.mark.slow_but("seed", "closed-chain", "two-robots")
 @pytest.mark.parametrize("way", TEXT)
 def test_text_of_mujocos_own_is_the_same_scene_but_for_the_digits_it_leaves_out(original: Original, way: Way) -> None:
     original.compare(way(original.path), LOST, LOST_WAY)
 
 
+@pytest.mark.slow_but("seed", "closed-chain", "two-robots")
 @pytest.mark.parametrize("way", TEXT)
 def test_text_with_all_digits_is_the_same_scene(original: Original, way: Way) -> None:
     with all_digits():

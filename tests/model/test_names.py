@@ -165,6 +165,7 @@ def test_a_stem_is_fit_for_every_system(name: str, stem: str) -> None:
 # Terminals.
 
 
+@pytest.mark.slow_but("script", "newline", "escape", "bidi", "surrogate", "long")
 def test_no_name_reaches_a_terminal_as_it_is(
     mesh: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

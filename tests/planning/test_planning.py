@@ -457,6 +457,7 @@ def test_wrong_words_are_told_before_anything_is_planned(room: Path, capsys: pyt
     assert "CFG542" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
     code = "import sys, env2mjcf.cli.plan, env2mjcf.cli.check; from env2mjcf import planning; planning.plan; "
     code += "sys.exit('ompl' in sys.modules)"

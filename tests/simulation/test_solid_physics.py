@@ -120,6 +120,7 @@ def test_a_non_convex_bug_comes_to_rest_in_the_bottle() -> None:
     assert -1.49 < scene.q()[2] < -1.1
 
 
+@pytest.mark.slow
 def test_alpha_tubes_hang_in_one_another() -> None:
     scene = env2mjcf.load(MODELS / "alpha/alpha.env", query=MODELS / "alpha/alpha.query")
     energy = start(scene, scene.queries[0].q[0])

@@ -72,6 +72,7 @@ class TestVerdicts:
         # Rows that do not lie one after the other in memory.
         np.testing.assert_array_equal(model.in_collision(np.asfortranarray(q)[::7]), together[::7])
 
+    @pytest.mark.slow_but("alpha", "bug-trap")
     def test_go_with_contacts(self, model: env2mjcf.Scene) -> None:
         for row in bisected(model, Truth(model), 20, 45, seed=6):
             assert bool(model.contacts(row)) == model.in_collision(row)
@@ -143,6 +144,7 @@ class TestClearance:
             )
             assert found == pytest.approx(expected, abs=1e-6 * model.extent)
 
+    @pytest.mark.slow_but("bug-trap")
     def test_is_positive_just_where_nothing_touches(self, model: env2mjcf.Scene) -> None:
         q = rows(model, 300, 8)
         hits = model.in_collision(q)

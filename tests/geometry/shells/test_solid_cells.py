@@ -64,6 +64,7 @@ def test_a_surface_that_crosses_or_touches_itself_has_no_cell_outside(mesh: Mesh
     assert_compiles(shape)
 
 
+@pytest.mark.slow_but("bug.g", "bent")
 @pytest.mark.parametrize("name", MODEL_MESHES)
 def test_cells_of_model_meshes_stay_inside_and_cover_the_surface(name: str) -> None:
     assert_inside_and_covering(loaded(MODELS / name))
