@@ -89,7 +89,7 @@ class Leaks:
         self.kept.append(None)
 
 
-@pytest.mark.slow_but("file")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("leak", "words"),
     [("scene", "memory grew"), ("descriptor", "descriptors grew"), ("thread", "threads grew"), ("file", "files grew")],
