@@ -1,4 +1,4 @@
-"""Tells the dialect of an env file from its text (env-format section 2)."""
+"""Tells the dialect of an env file from its text (docs/format/env.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nodes and edges of a roadmap, in whichever of the known layouts they are written (env-format section 13.3)."""
+"""The nodes and edges of a roadmap, in whichever of the known layouts they are written (docs/format/companions.md)."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from .source import Source
 
 T = TypeVar("T")
 
-# What C++ stream extraction accepts: no nan, inf or hexadecimal (env-format section 3.2). A number may be followed
+# What C++ stream extraction accepts: no nan, inf or hexadecimal. A number may be followed
 # by a comment, but 1.#INF is how some C++ libraries print infinity.
 _END = r"(?=[\s;:()\[\]]|#(?!INF|IND|QNAN|SNAN)|\Z)"
 # Digits belong to one part of the pattern only: else a long run of them is split in every way before it is no number.

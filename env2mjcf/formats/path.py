@@ -1,4 +1,4 @@
-"""Path files of all ages: configurations, or world poses of every link (env-format section 13.2)."""
+"""Path files of all ages: configurations, or world poses of every link (docs/format/companions.md)."""
 
 from __future__ import annotations
 

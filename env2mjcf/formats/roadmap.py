@@ -1,4 +1,4 @@
-"""Roadmap files of all ages: graphs of configurations (env-format section 13.3)."""
+"""Roadmap files of all ages: graphs of configurations (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def _compare(source: Source, counts: _Counts, nodes: Sequence[Node], *, whole: b
         message = f"declares {counts.nodes} nodes, and has {len(nodes)}"
         log.warn("CFG523", source.path, message, hint=f"write {len(nodes)}", span=counts.span)
     entries = sum(len(node.edges) for node in nodes)
-    # Up to 061300 an edge was counted once, later at both of its ends (env-format section 13.3).
+    # Up to 061300 an edge was counted once, later at both of its ends.
     if counts.edges not in (entries, entries / 2):
         message = f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge"
         hint = f"write {entries}, or {entries // 2} up to version 061300"

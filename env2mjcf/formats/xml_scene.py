@@ -1,4 +1,4 @@
-"""Dialect E's XML environments and XML robots (env-format section 8.3)."""
+"""Dialect E's XML environments and XML robots (docs/format/xml.md)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def read_environment(node: Node) -> Environment:
 
 
 def with_environment_attributes(environment: Environment, node: Node) -> Environment:
-    """Apply the attributes of an `<Environment>` element, which override the file (env-format section 8.1)."""
+    """Apply the attributes of an `<Environment>` element, which override the file."""
     resolution = environment.resolution
     for attribute, name in _RESOLUTIONS.items():
         value = node.number(attribute) if node.get(attribute) is not None else 0.0
@@ -154,7 +154,7 @@ def _read_base(node: Node) -> BaseKind:
 
 
 def _read_body(node: Node, base: BaseKind, *more_attributes: str) -> Body:
-    # XML meshes are not recentred by default, unlike those of text files (env-format section 10.3).
+    # XML meshes are not recentred by default, unlike those of text files.
     recentring = Recentring.NONE if node.get("comAdjustment") is None else node.choice("comAdjustment", _ADJUSTMENTS)
     body = Body(
         node.require("filename"),

@@ -48,7 +48,7 @@ class RobotKinematics:
         return len(self.dofs)
 
     def forward(self, q: ArrayLike) -> Array:
-        """Place every body (env-format section 9.4).
+        """Place every body.
 
         Args:
             q: Configurations, (..., dim).
@@ -122,7 +122,7 @@ class RobotKinematics:
         return gaps
 
     def home(self, log: DiagnosticLog | None = None) -> Array:
-        """Return the configuration that the file describes, (dim,) (design: section 4).
+        """Return the configuration that the file describes, (dim,).
 
         Joint values are reduced by whole turns, then clipped to their limits, each clipping with a diagnostic.
         """

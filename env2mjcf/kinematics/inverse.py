@@ -56,7 +56,7 @@ def _base_values(pose: Array) -> dict[DofKind, Array]:
 
 
 def _dh_values(robot: RobotKinematics, k: int, poses: Array) -> dict[DofKind, Array]:
-    """Return theta, alpha and d of a connection (env-format section 9.3)."""
+    """Return theta, alpha and d of a connection."""
     connection = robot.multibody.connections[k]
     between = inverse(poses[..., connection.previous, :, :]) @ poses[..., connection.next, :, :]
     row = inverse(pose_matrix(connection.to_dh)) @ between @ inverse(pose_matrix(connection.to_body))

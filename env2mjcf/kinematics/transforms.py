@@ -1,6 +1,6 @@
 """Rotations, quaternions and homogeneous transforms, batched over leading axes, in radians.
 
-Conventions (env-format section 9.1): column vectors, `p_world = R p + t`, right-handed, quaternions `w x y z`.
+Conventions (docs/format/kinematics.md): column vectors, `p_world = R p + t`, right-handed, quaternions `w x y z`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def rotation_matrix(rx: ArrayLike, ry: ArrayLike, rz: ArrayLike) -> Array:
-    """Return Rz(rz) Ry(ry) Rx(rx), shape (..., 3, 3), from angles of shape (...) (env-format section 9.2)."""
+    """Return Rz(rz) Ry(ry) Rx(rx), shape (..., 3, 3), from angles of shape (...)."""
     x, y, z = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (rx, ry, rz)))
     (cx, cy, cz), (sx, sy, sz) = (np.cos(v) for v in (x, y, z)), (np.sin(v) for v in (x, y, z))
     r = np.empty((*x.shape, 3, 3))
@@ -53,7 +53,7 @@ def inverse(t: Array) -> Array:
 
 
 def dh_matrix(form: DHForm, alpha: ArrayLike, a: ArrayLike, d: ArrayLike, theta: ArrayLike) -> Array:
-    """Return the transform (..., 4, 4) of a DH row (env-format section 9.3).
+    """Return the transform (..., 4, 4) of a DH row.
 
     Craig's `Rx(alpha) Tx(a) Rz(theta) Tz(d)` (Craig, Introduction to Robotics, eq. 3.6) or the standard
     `Rz(theta) Tz(d) Tx(a) Rx(alpha)` of Denavit and Hartenberg.

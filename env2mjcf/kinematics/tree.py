@@ -56,7 +56,7 @@ class Dof:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """How the bodies of a robot hang together (env-format section 9.4).
+    """How the bodies of a robot hang together (docs/format/kinematics.md).
 
     Attributes:
         parent: For each body the index of the connection that places it; None for a root.
@@ -79,7 +79,7 @@ _BASE_DOFS: dict[BaseKind, tuple[DofKind, ...]] = {
     BaseKind.FIXED: (),
 }
 
-# A spherical joint owns theta, then alpha (env-format section 9.5).
+# A spherical joint owns theta, then alpha.
 _JOINT_DOFS: dict[JointType, tuple[DofKind, ...]] = {
     JointType.REVOLUTE: (DofKind.THETA,),
     JointType.PRISMATIC: (DofKind.D,),
@@ -112,7 +112,7 @@ def build_tree(multibody: MultiBody, log: DiagnosticLog) -> Tree:
 
 
 def degrees_of_freedom(multibody: MultiBody, tree: Tree) -> tuple[Dof, ...]:
-    """List the numbers of a robot's configuration in the planner's order (env-format section 9.5)."""
+    """List the numbers of a robot's configuration in the planner's order (docs/format/kinematics.md)."""
     rules = RULES[multibody.dialect]
     dofs = [
         Dof(kind, body, periodic=not kind.is_length, lower=_turn(kind, -1), upper=_turn(kind, 1))

@@ -10,7 +10,7 @@ from .environment import BoundaryShape, DHForm, Dialect, Environment, JointType,
 
 
 class JointOrder(StrEnum):
-    """Which connection the n-th joint value belongs to (env-format sections 8.4 and 9.5)."""
+    """Which connection the n-th joint value belongs to (docs/format/kinematics.md)."""
 
     BODY = "body"  # A: the first backward connection of body 1, 2, ...; file order where the robot has loops
     FILE = "file"  # B to D
@@ -33,7 +33,7 @@ class DialectRules:
         keyword_case: Whether the original reader compares the case of keywords.
         plural_connections: Whether the original reader insists on `Connections`.
         needs_final_newline: Whether the original reader fails on a file that ends with its last token.
-        tests_fixed_base: Whether a robot's fixed base is tested against obstacles (section 11).
+        tests_fixed_base: Whether a robot's fixed base is tested against obstacles.
     """
 
     pose_angle: float
@@ -93,7 +93,7 @@ RULES: dict[Dialect, DialectRules] = {
 
 
 class SurfaceLabels(StrEnum):
-    """Whether the original reader takes a label after `Surface` (env-format section 7)."""
+    """Whether the original reader takes a label after `Surface` (docs/format/env.md)."""
 
     NONE = "none"
     OPTIONAL = "optional"
@@ -208,7 +208,6 @@ VOCABULARIES: dict[Dialect, Vocabulary] = {
 def begins_with_robot(environment: Environment) -> bool:
     """Say whether configurations in files begin with the index of their robot.
 
-    They do in some dialects (env-format section 9.6), and where there are several robots, which nothing else would tell
-    apart.
+    They do in dialects B to D, and where there are several robots, which nothing else would tell apart.
     """
     return VOCABULARIES[environment.dialect].query_index or len(environment.robots) > 1

@@ -23,7 +23,7 @@ def _span() -> Any:
 
 
 class Dialect(StrEnum):
-    """The five dialects of the format (env-format section 2)."""
+    """The five dialects of the format (docs/format/env.md)."""
 
     A = "A"
     B = "B"
@@ -71,7 +71,7 @@ class JointType(StrEnum):
 
 
 class Recentring(StrEnum):
-    """What is subtracted from a mesh's vertices when it is loaded (env-format section 10.3)."""
+    """What is subtracted from a mesh's vertices when it is loaded (docs/format/meshes.md)."""
 
     COM = "COM"  # the unweighted mean of the vertex list
     SURFACE = "Surface"  # its x and z only
@@ -109,7 +109,7 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class SMAShape:
-    """The two extra numbers of an SMAJoint (env-format section 6): bar length and width."""
+    """The two extra numbers of an SMAJoint: bar length and width."""
 
     length: float
     width: float
@@ -119,7 +119,7 @@ class SMAShape:
 class Connection:
     """A connection from body `previous` to body `next`, indices into the multibody's body list.
 
-    `T_next = T_previous * to_dh * T_DH(dh) * to_body` (env-format section 9.4), whatever the order of the two
+    `T_next = T_previous * to_dh * T_DH(dh) * to_body` (docs/format/kinematics.md), whatever the order of the two
     transforms in the file.
     """
 
@@ -338,7 +338,7 @@ class Environment:
 
     @property
     def robots(self) -> tuple[MultiBody, ...]:
-        """The robots: every Active multibody; without one, multibody 0 of a dialect A file (design: section 4)."""
+        """The robots: every Active multibody; without one, multibody 0 of a dialect A file."""
         moving = tuple(m for m in self.multibodies if m.moves)
         if not moving and self.dialect is Dialect.A:
             return self.multibodies[:1]

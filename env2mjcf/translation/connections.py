@@ -1,6 +1,6 @@
 """Connections in another dialect: joint types, limits, units.
 
-MERGED: Connections in the other DH form: the same pose for every value of the joint (env-format section 9.3).
+MERGED: Connections in the other DH form: the same pose for every value of the joint (docs/format/kinematics.md).
 
 MERGED: Poses as six numbers that a file can hold.
 """

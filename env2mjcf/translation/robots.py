@@ -164,7 +164,7 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     if not losses.vocabulary.legacy_layout:
         _report_home(body, base, losses)
         return replace(dressed, base=base, index=None, pose=(body.pose or Pose()) if base is BaseKind.FIXED else None)
-    # Dialect A's first FreeBody is a free base, every other one a link (env-format section 4).
+    # Dialect A's first FreeBody is a free base, every other one a link.
     free = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     if base not in (free, BaseKind.FIXED):
         losses.refuse(

@@ -141,7 +141,7 @@ class DofMap:
             value = float(configuration[old])
             if not dof.kind.is_length:
                 value *= ratio
-                # Turns go from 0 to 1, and pi units from -1 to 1 (env-format section 9.5).
+                # Turns go from 0 to 1, and pi units from -1 to 1.
                 if ratio > 1 and self.source.dofs[old].periodic:
                     value -= 2 * half_turn * math.floor(value / (2 * half_turn) + 0.5)
                     # 1.8 - 2 is not quite -0.2.

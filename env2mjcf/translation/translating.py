@@ -117,7 +117,7 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
     if losses.vocabulary.robot_files:
         found.sort(key=lambda m: m.robot_file is not None)
     elif losses.vocabulary.legacy_layout and environment.dialect is not losses.dialect:
-        # Its planner moves multibody 0, whatever the tag says (env-format section 4.2).
+        # Its planner moves multibody 0, whatever the tag says.
         found.sort(key=lambda m: not m.moves)
     return tuple(found)
 

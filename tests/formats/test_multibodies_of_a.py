@@ -1,4 +1,4 @@
-"""Dialect A, the planner of 1998 to 2012 (env-format section 4): every angle in degrees, `to_body` before `to_dh`."""
+"""Dialect A, the planner of 1998 to 2012: every angle in degrees, `to_body` before `to_dh`."""
 
 from __future__ import annotations
 

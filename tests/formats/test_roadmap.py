@@ -1,4 +1,4 @@
-"""Roadmap files of all ages, as text (env-format section 13.3)."""
+"""Roadmap files of all ages, as text (docs/format/companions.md)."""
 
 from __future__ import annotations
 

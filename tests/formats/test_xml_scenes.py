@@ -1,4 +1,4 @@
-"""XML environments, XML robots and the planner's problem files (env-format section 8)."""
+"""XML environments, XML robots and the planner's problem files (docs/format/xml.md)."""
 
 from __future__ import annotations
 

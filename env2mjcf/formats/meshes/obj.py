@@ -1,7 +1,7 @@
-"""Wavefront `.obj` meshes: the raw vertex list, and all faces as one mesh (env-format section 10.2).
+"""Wavefront `.obj` meshes: the raw vertex list, and all faces as one mesh (docs/format/meshes.md).
 
 trimesh drops vertices that no face uses and splits others at texture seams. The planner's origin is the mean of the
-raw list (section 10.3), so that the list has to be read as it stands.
+raw list, so that the list has to be read as it stands.
 """
 
 from __future__ import annotations
