@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from ..model.dialects import rules_of
 from ..model.environment import (
     Actuator,
     BaseKind,
@@ -20,12 +21,12 @@ from ..model.environment import (
     Pose,
     Recentring,
 )
-from .blocks import SHAPES, Grammar, read_color, read_dh, read_extent, read_pose
+from .blocks import SHAPES, read_color, read_dh, read_extent, read_pose
 from .bodies import SELF_CONNECTION, read_body_index, read_limits, warn_of_no_limits
 from .lexer import Scanner
 from .xml import Node
 
-_GRAMMAR = Grammar.of(Dialect.E)
+_RULES = rules_of(Dialect.E)
 _JOINTS = {"revolute": JointType.REVOLUTE, "spherical": JointType.SPHERICAL, "nonactuated": JointType.NON_ACTUATED}
 _RANGES = {JointType.REVOLUTE: ("range",), JointType.SPHERICAL: ("range", "range2"), JointType.NON_ACTUATED: ()}
 _KINDS = {"passive": MultiBodyKind.PASSIVE, "internal": MultiBodyKind.INTERNAL, "surface": MultiBodyKind.SURFACE}
@@ -59,7 +60,7 @@ def with_environment_attributes(environment: Environment, node: Node) -> Environ
     for attribute, name in _RESOLUTIONS.items():
         value = node.number(attribute) if node.get(attribute) is not None else 0.0
         if value > 0:
-            value = value * _GRAMMAR.rules.configuration_angle if name == "orientation" else value
+            value = value * _RULES.configuration_angle if name == "orientation" else value
             resolution = replace(resolution, **{name: value})
             if name == "position":
                 resolution = replace(resolution, span=node.span_of(attribute))
@@ -89,7 +90,7 @@ def read_robot(node: Node) -> MultiBody:
         tuple(bodies),
         tuple(connections),
         dialect=Dialect.E,
-        dh_form=_GRAMMAR.rules.dh_form,
+        dh_form=_RULES.dh_form,
         actuators=_read_actuators(node),
         robot_file=node.source.path,
         span=multibody.span,
@@ -143,7 +144,7 @@ def _read_obstacle(node: Node) -> MultiBody:
             at="type",
         )
     body = _read_body(base, BaseKind.FIXED)
-    return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_GRAMMAR.rules.dh_form, span=node.span)
+    return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_RULES.dh_form, span=node.span)
 
 
 def _read_base(node: Node) -> BaseKind:
@@ -215,7 +216,7 @@ def _read_connection(link: Node, number: int, bodies: int) -> Connection:
         following,
         joint,
         to_dh=node.read("transformParentToDH", _pose),
-        dh=node.read("initialDHParams", lambda scan: read_dh(scan, _GRAMMAR)),
+        dh=node.read("initialDHParams", lambda scan: read_dh(scan, _RULES)),
         to_body=node.read("transformDHToChild", _pose),
         limits=tuple(_read_limits(node, name, joint) for name in ranges),
         span=node.span,
@@ -224,11 +225,11 @@ def _read_connection(link: Node, number: int, bodies: int) -> Connection:
 
 def _read_limits(node: Node, name: str, joint: JointType) -> JointLimits:
     if node.get(name) is not None:
-        return node.read(name, lambda scan: read_limits(scan, _GRAMMAR, joint))
-    warn_of_no_limits(node.log, _GRAMMAR, joint, node.span)
-    unit = _GRAMMAR.rules.configuration_angle
+        return node.read(name, lambda scan: read_limits(scan, _RULES, joint))
+    warn_of_no_limits(node.log, _RULES, joint, node.span)
+    unit = _RULES.configuration_angle
     return JointLimits(-unit, unit, node.span)
 
 
 def _pose(scan: Scanner) -> Pose:
-    return read_pose(scan, _GRAMMAR)
+    return read_pose(scan, _RULES)

@@ -291,17 +291,17 @@ class TestLimits:
 STARVED = f"""
 import resource, sys
 import numpy as np
-from env2mjcf.errors import DiagnosticLog, Env2MjcfError
-from env2mjcf.options import Limits
-import env2mjcf
-from env2mjcf.formats.arrays import map_array
-from env2mjcf.formats.byu import read_byu
-from env2mjcf.formats.gms import read_gms
+from env2mjcf.companions.arrays import map_array
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Env2MjcfError
 from env2mjcf.formats.lexer import parse_integer
-from env2mjcf.formats.obj import read_obj
+from env2mjcf.formats.meshes.byu import read_byu, read_gms
+from env2mjcf.formats.meshes.obj import read_obj
 from env2mjcf.formats.path import read_path
+from env2mjcf.formats.reading import read
 from env2mjcf.formats.roadmap import read_roadmap
 from env2mjcf.formats.source import Source
+from env2mjcf.limits import Limits
 in_use = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (in_use + 64 * {MEGA}, resource.RLIM_INFINITY))
 unlimited = Limits(**{{name: 10**15 for name in Limits.__slots__ if name not in ("file_bytes", "nesting")}})
@@ -315,8 +315,8 @@ for n in (10**8, 10**12, 10**14):
         lambda: read_obj(f"v 0 0 0\\nf 1 {{n}} 2\\n", "x", log, unlimited),
         lambda: read_path(source(f"VIZMO_PATH_FILE   Path Version 2012\\n1\\n{{n}}\\n0 0 0 0\\n"), (3,), (1,), log),
         lambda: read_roadmap(source(f"#####GRAPHSTART#####\\n{{n}} {{n}} {{n}}\\n0 0 0 0 {{n}}\\n"), (3,), log),
-        lambda: env2mjcf.read(sys.argv[1] + f"/bodies{{n}}.env", limits=unlimited),
-        lambda: env2mjcf.read(sys.argv[1] + f"/links{{n}}.env", limits=unlimited),
+        lambda: read(sys.argv[1] + f"/bodies{{n}}.env", limits=unlimited),
+        lambda: read(sys.argv[1] + f"/links{{n}}.env", limits=unlimited),
         lambda: map_array(sys.argv[1] + f"/rows{{n}}.npy", log),
     ):
         try:
