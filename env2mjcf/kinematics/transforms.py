@@ -121,6 +121,23 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     return np.where(q[..., :1] < 0, -q, q)
 
 
+def pose_gaps(found: Array, expected: Array, radii: ArrayLike) -> Array:
+    """Return how far bodies are from where they should be, (...).
+
+    An upper bound of the distance over a ball about each body's origin: how far that is off, and twice the radius
+    times the sine of half the turn.
+
+    Args:
+        found: Poses, (..., 4, 4).
+        expected: Where they should be, of the same shape.
+        radii: (...) greatest distance of a vertex from the origin.
+    """
+    moved = np.linalg.norm(found[..., :3, 3] - expected[..., :3, 3], axis=-1)
+    # |R1 - R2| (Frobenius) is 2 sqrt(2) sin(w / 2) for a turn by w, and keeps its digits where w is small.
+    turned = np.linalg.norm(found[..., :3, :3] - expected[..., :3, :3], axis=(-2, -1)) / np.sqrt(2)
+    return moved + turned * np.asarray(radii)
+
+
 def wrap(angle: ArrayLike) -> Array:
     """Return angles reduced by whole turns to [-pi, pi)."""
     a = np.asarray(angle, dtype=np.float64)
