@@ -61,7 +61,7 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
     else:
         expected = "a number of multibodies, 'Boundary' or XML"
         wrong = first
-    message = f"{source.path} is no environment: found {wrong[:40]!r}; expected {expected}"
+    message = f"{source.path} is not an environment: found {wrong[:40]!r}; expected {expected}"
     hint = "name an environment, or choose its dialect with dialect= (--dialect)"
     log.fail("ENV130", source.path, message, hint=hint, span=_place(source, wrong))
 
@@ -87,7 +87,7 @@ def _with_boundary(text: str) -> Dialect:
     match = _BOUNDARY.match(text)
     if match and not match.group(1):
         return Dialect.C
-    # `-a( Surface )` is no tag.
+    # `-a( Surface )` is not a tag.
     words = set(_TAG_LIKE.findall(_OPTION.sub("", text)))
     return Dialect.D if any(map(_is_robot_tag, words)) else Dialect.E
 

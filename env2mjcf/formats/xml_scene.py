@@ -137,12 +137,8 @@ def _read_obstacle(node: Node) -> MultiBody:
     base = node.only_child("Base", "ENV145")
     node.ignore_other_children("Base")
     if base.get("type") is not None and base.choice("type", {**_BASES, "joint": "Joint"}) != "Fixed":
-        base.fail(
-            "ENV123",
-            f"an obstacle with a {base.get('type')} base; expected fixed",
-            hint="write type='fixed'",
-            at="type",
-        )
+        message = f"an obstacle with a {base.get('type')} base; expected fixed"
+        base.fail("ENV123", message, hint="write type='fixed'", at="type")
     body = _read_body(base, BaseKind.FIXED)
     return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_RULES.dh_form, span=node.span)
 

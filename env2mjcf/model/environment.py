@@ -1,8 +1,7 @@
 """The scene as its file describes it: robots, obstacles, boundary, tasks.
 
-Words of the file format stay as they are (`MultiBody`, `FreeBody`, `Connection`, `DHParameters`).
-Lengths are in file units, every angle is in radians. Each value keeps the span it was read from;
-spans take no part in comparisons.
+Words of the file format stay as they are (`MultiBody`, `FreeBody`, `Connection`, `DHParameters`). Lengths are in file
+units, every angle is in radians. Each value keeps the span it was read from; spans take no part in comparisons.
 """
 
 from __future__ import annotations
@@ -232,8 +231,7 @@ class Boundary:
     Attributes:
         shape: Box or ball, 2-D or 3-D.
         lower, upper: Corners of a box, one entry per bounded axis; empty for a ball.
-        center: Centre of a ball, one entry per bounded axis; empty for a box.
-        radius: Radius of a ball.
+        center, radius: Those of a ball, the centre with one entry per bounded axis; empty and 0 for a box.
         space: `workspace`, or `cspace` where an XML file says so.
     """
 
@@ -252,9 +250,8 @@ class Resolution:
 
     Attributes:
         position: `PositionRes`, file units.
-        position_factor: `PositionResFactor`.
         orientation: `Orientation`, radians.
-        time, rd: `TimeRes`, `RDRes`.
+        position_factor, time, rd: `PositionResFactor`, `TimeRes`, `RDRes`.
         span: Where `position` stands.
     """
 
@@ -316,7 +313,7 @@ class Environment:
         comments: All comment lines.
         directory: Folder that mesh files are relative to.
         path: The file, as it was named by the caller.
-        sources: All files that it was read from, robots and queries, too; what is written replaces none of them.
+        sources: All files that it was read from, robots and queries, too; nothing that is written replaces one.
         diagnostics: What the readers found.
     """
 
@@ -340,15 +337,13 @@ class Environment:
     def robots(self) -> tuple[MultiBody, ...]:
         """The robots: every Active multibody; without one, multibody 0 of a dialect A file."""
         moving = tuple(m for m in self.multibodies if m.moves)
-        if not moving and self.dialect is Dialect.A:
-            return self.multibodies[:1]
-        return moving
+        return self.multibodies[:1] if not moving and self.dialect is Dialect.A else moving
 
     @property
     def obstacles(self) -> tuple[MultiBody, ...]:
         """Everything that is neither a robot nor a Surface."""
-        robots = {id(r) for r in self.robots}
-        return tuple(m for m in self.multibodies if m.kind is not MultiBodyKind.SURFACE and id(m) not in robots)
+        others = {id(m) for m in (*self.robots, *self.surfaces)}
+        return tuple(m for m in self.multibodies if id(m) not in others)
 
     @property
     def surfaces(self) -> tuple[MultiBody, ...]:
