@@ -144,8 +144,7 @@ class Body:
         pose: World pose of a fixed body; the display pose of dialect A's first FreeBody; None where the file has none.
         recentring: What is subtracted from the mesh's vertices.
         color: RGBA in 0..1, from `-c(...)`, a `#VIZMO_COLOR` line or an XML attribute.
-        texture: File name of a texture.
-        mass: Mass given by the file.
+        texture, mass: A texture's file name, and the mass, where the file gives them.
         label: The visualiser's `#VIZMO_NAME`.
         index: Dialect A's index field, which no planner used.
     """
@@ -185,8 +184,7 @@ class MultiBody:
 
     Attributes:
         kind: Role by tag.
-        bodies: In file order.
-        connections: In file order.
+        bodies, connections: In file order.
         dialect: Which dialect's rules its numbers follow (a scene may mix an environment and a newer robot file).
         dh_form: Which product a DH row stands for.
         adjacencies: Pairs of body indices that count as connected.
