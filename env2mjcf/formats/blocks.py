@@ -99,7 +99,7 @@ def read_counted(
         FormatError: The file ends too early: one that is cut off must not read as another robot.
     """
     start = scan.position
-    declared = scan.count(f"the number of {_plural(what)}", getattr(scan.limits, limit), limit)
+    declared = scan.count(f"the number of {_plural(what)}", limit)
     span = scan.span(start)
     found: list[T] = []
     while follows(len(found) < declared) if follows else scan.next_is_number():

@@ -38,7 +38,7 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
     """Return the dialect of an environment's text.
 
     Raises:
-        FormatError: The text is none of them.
+        FormatError: The text is not in any dialect.
     """
     text = _COMMENT.sub("", source.text)
     first, second = _first_words(text)

@@ -91,7 +91,7 @@ def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
 
 def _read_multibodies(scan: Scanner, rules: DialectRules) -> tuple[tuple[MultiBody, ...], int]:
     start = scan.position
-    declared = scan.count("the number of multibodies", scan.limits.bodies, "bodies")
+    declared = scan.count("the number of multibodies", "bodies")
     span = scan.span(start)
     found: list[MultiBody] = []
     bodies = connections = 0

@@ -163,9 +163,9 @@ class Scanner:
         """Read an integer."""
         return self._numeral(_INTEGER, parse_integer, f"an integer ({what})", what)
 
-    def count(self, what: str, at_most: int, limit: str) -> int:
+    def count(self, what: str, limit: str) -> int:
         """Read a count that is neither negative nor beyond a limit, one of the fields of `Limits`."""
-        start = self.position
+        start, at_most = self.position, getattr(self.limits, limit)
         value = self.integer(what)
         if not 0 <= value <= at_most:
             hint = Limits.hint(limit) if value > 0 else "write how many follow"

@@ -106,7 +106,7 @@ def _with_controls(scan: Scanner, multibody: MultiBody) -> MultiBody:
     linear, angular = scan.numbers("linear angular")
     scan.keyword({"Controls": None}, "tag")
     start = scan.position
-    count = scan.count("the number of controls", scan.limits.connections, "connections")
+    count = scan.count("the number of controls", "connections")
     span = scan.span(start)
     rest = scan.line()
     if not rest.at_end():

@@ -219,7 +219,7 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
         One task for each robot that has configurations, in the order of the robots.
 
     Raises:
-        FormatError: A row fits no robot, or there is none.
+        FormatError: A row fits no robot, or the file has no row.
     """
     lines = regrouped(number_lines(source, log), dofs)
     if not lines:

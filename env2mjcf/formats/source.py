@@ -103,7 +103,7 @@ class Source:
 def quoted(begin: int, end: int, place: int) -> tuple[int, int]:
     """Return which part of the line from `begin` to `end` is quoted about a place.
 
-    The whole line, unless it is very long: each of the bodies of a scene on one line would hold it whole.
+    The whole line, unless it is very long: else each of many bodies on one line would keep a copy of it.
     """
     if end - begin <= _LONGEST_QUOTE:
         return begin, end

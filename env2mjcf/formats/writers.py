@@ -37,7 +37,7 @@ def env_text(environment: Environment) -> str:
     """Return an environment as text of its own dialect, comments at the top.
 
     Robots that have files of their own are left out: `robot_text` writes them. What the dialect cannot express is left
-    out, too; `translate` says what that is, also where it is asked for the dialect that the environment has.
+    out, too; `translate` reports what that is, also when it translates into the environment's own dialect.
     """
     rules = rules_of(environment.dialect, environment.semantics)
     inside = [m for m in environment.multibodies if m.robot_file is None]

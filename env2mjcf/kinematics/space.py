@@ -202,7 +202,7 @@ class ConfigurationSpace:
         Periodic degrees of freedom go the short way round; the last row equals q1 up to whole turns.
 
         Raises:
-            ValueError: n is below 2, or q0 or q1 is no configuration.
+            ValueError: n is below 2, or q0 or q1 is not a configuration.
         """
         if n < 2:
             raise ValueError(f"n is {n}; expected at least 2, for both ends")
