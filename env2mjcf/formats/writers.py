@@ -163,7 +163,7 @@ def _legacy(multibody: MultiBody, rules: DialectRules) -> Iterator[str]:
         words = ["FixedBody" if fixed else "FreeBody", str(index), body.filename]
         if fixed or body.pose is not None:
             words.append(_pose(body.pose, rules.pose_angle))
-        yield from _dressed(body, words, rules)
+        yield from _body_lines(body, words, rules)
     yield from _connections(multibody, rules)
 
 
@@ -174,7 +174,7 @@ def _later(multibody: MultiBody, rules: DialectRules) -> Iterator[str]:
     if not multibody.moves:
         body = multibody.bodies[0]
         words = [body.filename, *_options(body, rules), _pose(body.pose, rules.pose_angle)]
-        yield from _dressed(body, words, rules)
+        yield from _body_lines(body, words, rules)
         return
     yield from _robot(multibody, rules)
     if multibody.velocity_bounds is not None:
@@ -192,7 +192,7 @@ def _robot(robot: MultiBody, rules: DialectRules) -> Iterator[str]:
         words.append(body.base.value)
         if body.base is BaseKind.FIXED:
             words.append(_pose(body.pose, rules.pose_angle))
-        yield from _dressed(body, words, rules)
+        yield from _body_lines(body, words, rules)
     if robot.adjacencies and rules.adjacencies:
         yield "Adjacencies"
         yield str(len(robot.adjacencies))
@@ -211,7 +211,7 @@ def _options(body: Body, rules: DialectRules) -> Iterator[str]:
         yield f"-t({body.texture})"
 
 
-def _dressed(body: Body, words: Iterable[str], rules: DialectRules) -> Iterator[str]:
+def _body_lines(body: Body, words: Iterable[str], rules: DialectRules) -> Iterator[str]:
     """Yield the line of a body behind the visualiser's lines about it."""
     if body.color is not None and not rules.options:
         yield f"#VIZMO_COLOR {' '.join(map(_short, body.color[:3]))}"

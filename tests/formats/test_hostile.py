@@ -119,7 +119,7 @@ class TestTime:
         "options that are not closed": (lambda n: BOX + "1\nPassive\nx.g " + "-a(" * n, 20_000),
         "digits that are no number": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}x", 5000),
         "digits on both sides of a point": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}.{'1' * n}x", 5000),
-    }  # fmt: skip
+    }
     MAPS: ClassVar[dict[str, tuple[Callable[[int], str], int]]] = {
         "hashes": (lambda n: "#" * n, 20_000),
         "a long word": (lambda n: "x" * n + "GRAPHSTAR", 20_000),
@@ -133,7 +133,7 @@ class TestTime:
         "query": lambda w: rows_of(f"{w} 0 0\n", Limits()),
         "path": lambda w: read_path(Source.of("x", f"{PATH}1\n{w} 0 0\n"), (3,), (1,), DiagnosticLog()),
         "count of a path": lambda w: read_path(Source.of("x", f"{PATH}{w}\n0 0 0\n"), (3,), (1,), DiagnosticLog()),
-    }  # fmt: skip
+    }
 
     @staticmethod
     def grows(run: Callable[[str], object], make: Callable[[int], str], size: int) -> float:
@@ -238,8 +238,10 @@ PASSED: dict[str, tuple[str, Callable[[Reader, Limits], object]]] = {
     "connections": (
         "ENV110",
         lambda r, x: r.env(
-            BOX + "1\nActive\n3\nx.g Fixed 0 0 0 0 0 0\nx.g Joint\nx.g Joint\nConnections\n2\n"
-            + "".join(f"{i} {i + 1} NonActuated\n{'0 ' * 6}\n{'0 ' * 4}\n{'0 ' * 6}\n" for i in range(2)), x,
+            BOX
+            + "1\nActive\n3\nx.g Fixed 0 0 0 0 0 0\nx.g Joint\nx.g Joint\nConnections\n2\n"
+            + "".join(f"{i} {i + 1} NonActuated\n{'0 ' * 6}\n{'0 ' * 4}\n{'0 ' * 6}\n" for i in range(2)),
+            x,
         ),
     ),
     "name_length": ("ENV109", lambda r, x: r.env(BOX + "1\nPassive\nlong.g 0 0 0 0 0 0\n", x)),
@@ -253,7 +255,7 @@ PASSED: dict[str, tuple[str, Callable[[Reader, Limits], object]]] = {
     "scene_cells": ("GEO272", lambda r, x: r.scene(BOX + "2\nPassive\ncube.g 0 0 0 0 0 0\n" + ROBOT, x)),
     "mesh_work": ("GEO273", lambda r, x: r.scene(BOX + "1\nPassive\nloose.g 0 0 0 0 0 0\n", x)),
     "pairs": ("GEO275", lambda r, x: r.scene(BOX + "3\n" + "Passive\ncube.g 9 9 9 0 0 0\n" * 2 + ROBOT, x)),
-}  # fmt: skip
+}
 
 
 class TestLimits:
@@ -347,7 +349,7 @@ class TestNumbers:
         "gms": lambda r, w: read_gms(f"3 {w} 0 0 1 0 0 0 1 0 1 3 0 1 2\n", "x", DiagnosticLog(), Limits()),
         "query": lambda r, w: rows_of(f"{w} 0 0\n", Limits()),
         "roadmap": lambda r, w: nodes_of(NODES.replace("0 0 0 0 0", f"0 {w} 0 0 0"), Limits()),
-    }  # fmt: skip
+    }
 
     @pytest.mark.parametrize("reader", READERS)
     @pytest.mark.parametrize("word", BAD)
