@@ -15,7 +15,7 @@ from .lexer import Scanner, parse_number
 
 T = TypeVar("T")
 
-# An angle beyond two turns is hardly one in radians: it is taken for one in degrees.
+# An angle beyond two turns was probably meant in degrees.
 _SUSPICIOUS_RADIANS = 4 * math.pi
 
 _MULTIBODY_TAGS = {"multibody", *(k.value.lower() for k in MultiBodyKind)}
