@@ -31,7 +31,8 @@ import env2mjcf
 
 # The path of an entry of the list, as a failure prints it, and why it is another now.
 CHANGED: dict[str, str] = {
-    "entry_points/pytest11/env2mjcf": "the plugin is part of the package; only its entry point is public"
+    "entry_points/pytest11/env2mjcf": "the plugin is part of the package; only its entry point is public",
+    "names/env2mjcf/Scene/methods/step": "now `resolution`: in a class about MuJoCo `step` would step physics",
 }
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -14,7 +14,6 @@ from ..diagnostics import DiagnosticLog
 from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
-from ..simulation.verdicts import Judge
 from ..system.locks import Lock
 from .planner_space import PlanningSpace
 from .planners import known
@@ -152,7 +151,7 @@ def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
 
 def _step(scene: Scene, resolution: float | None) -> float:
     """Return the planner's step in metres."""
-    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    step = scene.resolution(None if resolution is None else positive("resolution", resolution))
     least = _FINEST * scene.extent
     if step >= least:
         return step
@@ -181,10 +180,9 @@ def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int
 
 def _refuse_invalid(scene: Scene, rows: Array) -> None:
     """Raise a ValueError that says who touches in the first configuration that is not valid."""
-    judge = Judge(scene, rows, names_of(len(rows)))
-    for i in np.flatnonzero(~judge.valid):
-        verdict = judge.verdict(int(i))
-        raise ValueError(f"the {verdict.label} is not valid: {'; '.join(verdict.reasons())}")
+    for name, row in zip(names_of(len(rows)), rows, strict=True):
+        if not scene.is_valid(row):
+            raise ValueError(f"the {name} is not valid: {'; '.join(map(str, scene.explain(row).reasons))}")
 
 
 def names_of(count: int) -> list[str]:
