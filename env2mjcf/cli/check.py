@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ..simulation.scene import Scene
     from ..simulation.verdicts import Verdicts
 
-# More configurations than this are not listed one by one unless asked for.
+# More configurations than this are listed one by one only with --all.
 _LISTED = 20
 
 
@@ -212,31 +212,26 @@ def _pose_summary(poses: Poses) -> Text:
 
 
 def _node_summary(nodes: Verdicts, what: str) -> Text:
-    total, valid = len(nodes.valid), int(nodes.valid.sum())
-    counts = [f"{valid} valid"]
-    for wrong, so in (
-        ("in collision", nodes.in_collision),
-        ("out of limits", ~nodes.in_limits),
-        ("outside the boundary", ~nodes.inside),
-    ):
-        if so.any():
-            counts.append(f"{int(so.sum())} {wrong}")
-    return Text(f"{_counted(total, what)}: {', '.join(counts)}", "bold")
+    wrong = {
+        "in collision": nodes.in_collision.sum(),
+        "out of limits": (~nodes.in_limits).sum(),
+        "outside the boundary": (~nodes.inside).sum(),
+    }
+    return Text(f"{_counted(len(nodes.valid), what)}: {_counts(f'{nodes.valid.sum()} valid', wrong)}", "bold")
 
 
 def _edge_summary(edges: EdgeVerdicts) -> Text:
-    valid = int(edges.valid.sum())
-    counts = [f"{valid} valid{'' if edges.proved is None else ' and proved free'}"]
-    unproved = 0 if edges.proved is None else int((edges.stepped & ~edges.proved).sum())
-    for wrong, so in (
-        ("invalid", int((edges.checked & ~edges.stepped).sum())),
-        ("not proved", unproved),
-        ("not checked", int((~edges.checked).sum())),
-    ):
-        if so:
-            counts.append(f"{so} {wrong}")
-    steps = f", checked every {edges.resolution:.4g} m"
-    return Text(f"{_counted(len(edges.valid), 'edge')}{steps}: {', '.join(counts)}", "bold")
+    wrong = {
+        "invalid": (edges.checked & ~edges.stepped).sum(),
+        "not proved": 0 if edges.proved is None else (edges.stepped & ~edges.proved).sum(),
+        "not checked": (~edges.checked).sum(),
+    }
+    counts = _counts(f"{edges.valid.sum()} valid{'' if edges.proved is None else ' and proved free'}", wrong)
+    return Text(f"{_counted(len(edges.valid), 'edge')}, checked every {edges.resolution:.4g} m: {counts}", "bold")
+
+
+def _counts(valid: str, wrong: dict[str, int]) -> str:
+    return ", ".join([valid, *(f"{count} {what}" for what, count in wrong.items() if count)])
 
 
 def _first_invalid(nodes: Verdicts, edges: EdgeVerdicts) -> Iterator[Text]:

@@ -35,10 +35,6 @@ class Containment:
     Where surfaces do not cross, a component lies inside a solid whole or not at all, so one of its vertices decides:
     its winding number about the solid's triangles is not zero (Jacobson et al., Robust Inside-Outside Segmentation
     using Generalized Winding Numbers, 2013).
-
-    Args:
-        pairs: The tested pairs.
-        parts: All bodies by name.
     """
 
     def __init__(self, pairs: tuple[Pair, ...], parts: Mapping[str, Part]) -> None:
@@ -56,16 +52,9 @@ class Containment:
         return bool(self._probes)
 
     def inside(self, poses: Mapping[str, Array]) -> NDArray[np.bool_]:
-        """Return whether any body lies inside another, (n,).
-
-        Args:
-            poses: World poses by name, (n, 4, 4) each.
-        """
+        """Return whether any body lies inside another, (n,), for world poses by name, (n, 4, 4) each."""
         n = max((len(p) for p in poses.values()), default=0)
-        found = np.zeros(n, dtype=bool)
-        for probe in self._probes:
-            found |= self._probe(probe, poses)
-        return found
+        return np.logical_or.reduce([np.zeros(n, dtype=bool), *(self._probe(p, poses) for p in self._probes)])
 
     def pairs_inside(self, poses: Mapping[str, Array]) -> list[tuple[int, Array]]:
         """Return (index of the pair, a point of the inner body) for each contained body; poses are (1, 4, 4)."""
@@ -95,11 +84,9 @@ def _component_points(part: Part) -> Array:
 
 
 class BoundaryTest:
-    """Tests the vertices of links against a boundary, which is closed; axes that it does not name are unbounded.
+    """Tests the vertices of links against a boundary, in metres; None accepts everything.
 
-    Args:
-        boundary: In metres; None accepts everything.
-        links: The links, in the order of the poses that will be asked about.
+    The boundary is closed; axes that it does not name are unbounded. Poses come in the order of the links.
     """
 
     def __init__(self, boundary: Boundary | None, links: Sequence[Part]) -> None:

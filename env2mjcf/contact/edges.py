@@ -24,12 +24,7 @@ _MOST_ROWS = 10_000_000
 
 
 class EdgeSteps:
-    """Cuts straight edges so that no point of a robot moves further than the resolution between two checks.
-
-    Args:
-        assembly: The scene.
-        space: Its configuration space.
-    """
+    """Cuts straight edges so that no point of a robot moves further than the resolution between two checks."""
 
     def __init__(self, assembly: Assembly, space: ConfigurationSpace) -> None:
         self._assembly = assembly
@@ -38,11 +33,11 @@ class EdgeSteps:
 
     @property
     def usual(self) -> float:
-        """The step in metres where nothing is asked for, and the file has none: 0.01 extent."""
+        """The step in metres where neither the caller nor the file gives one: 0.01 extent."""
         return _DEFAULT_RESOLUTION * self._assembly.extent
 
     def resolution(self, resolution: float | None) -> float:
-        """Return the step in metres: what was asked for, else the file's PositionRes, else 0.01 extent.
+        """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
             ValueError: The resolution is not a positive number.
@@ -95,13 +90,7 @@ def even_rows(start: Array, delta: Array, counts: NDArray[np.int64], at: NDArray
 
 
 class MotionBounds:
-    """Bounds of motion from distances along the chains of links.
-
-    Args:
-        assembly: The scene.
-        space: Its configuration space.
-        pairs: Pairs of links, for `pairs`.
-    """
+    """Bounds of motion from distances along the chains of links."""
 
     def __init__(self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair] = ()) -> None:
         self._robots = assembly.robots

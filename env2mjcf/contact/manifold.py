@@ -22,7 +22,7 @@ from .types import Contact
 _MOST = 8
 # Contacts nearer than this, in sizes of the smaller body, whose normals are within about 18 degrees, are one.
 _NEAR, _ALIKE = 0.05, 0.95
-# Cells and triangles may differ by the band of verdicts (design: section 6), in extents.
+# Cells and triangles may differ by the band of verdicts, in extents.
 _BAND = 1e-5
 _BLOCK = 4096
 
@@ -42,13 +42,6 @@ class Manifolds:
     Contacts of two hulls are MuJoCo's own. The normals and depths of thin surface cells mean nothing, so those of
     surfaces come from the triangles that touch: the normal is that of one of the two faces, and the depth how far to
     push the link's triangle against it until it is beside the other. Bodies inside others are pushed out.
-
-    Args:
-        pairs: The tested pairs.
-        parts: All bodies by name.
-        surfaces: Their triangles.
-        clearance: Their distances.
-        extent: The scene's.
     """
 
     def __init__(

@@ -1,12 +1,9 @@
-"""MuJoCo's own collision detection as an engine of verdicts and contacts.
-
-MERGED: Pairs that cannot move against each other: decided once, and added to every answer.
-"""
+"""MuJoCo's own collision detection: verdicts, contacts, and the pairs that cannot move, which are decided once."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -14,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kinematics.transforms import Array
 from ..pairs import Pair
-from .types import Contact
+from .types import Contact, deepest
 
 
 class MujocoEngine:
@@ -45,7 +42,7 @@ class MujocoEngine:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """The model that is asked: an engine made of it answers alike."""
+        """The model: an engine made of it answers alike."""
         return self._model
 
     def data(self) -> mujoco.MjData:
@@ -94,41 +91,24 @@ class MujocoEngine:
 def static_contacts(
     model: mujoco.MjModel, data: mujoco.MjData, pairs: tuple[Pair, ...], owners: Mapping[str, str]
 ) -> tuple[Contact, ...]:
-    """Return the contacts of all constant pairs, the deepest of each.
-
-    Args:
-        model: The scene's model.
-        data: Its data, with kinematics at any configuration.
-        pairs: The tested pairs.
-        owners: Name of the body that each collision geom belongs to.
-    """
+    """Return the contacts of all constant pairs, the deepest of each; `data` has kinematics at any configuration."""
     geoms: dict[str, list[int]] = {}
     for geom, owner in owners.items():
         geoms.setdefault(owner, []).append(int(model.geom(geom).id))
-    found: list[Contact] = []
-    for pair in pairs:
-        if pair.constant:
-            contact = _deepest(model, data, pair, geoms.get(pair.link, []), geoms.get(pair.other, []))
-            if contact is not None:
-                found.append(contact)
-    return tuple(found)
+    constant = [p for p in pairs if p.constant and p.link in geoms and p.other in geoms]
+    return deepest(c for p in constant for c in _touches(model, data, p, geoms[p.link], np.array(geoms[p.other])))
 
 
-def _deepest(
-    model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, mine: list[int], others: list[int]
-) -> Contact | None:
-    best: Contact | None = None
-    if not mine or not others:
-        return None
-    second = np.array(others)
-    centers, radii = data.geom_xpos[second], model.geom_rbound[second]
+def _touches(
+    model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, mine: list[int], others: NDArray[np.int64]
+) -> Iterator[Contact]:
+    centers, radii = data.geom_xpos[others], model.geom_rbound[others]
     for a in mine:
         gaps = np.linalg.norm(centers - data.geom_xpos[a], axis=1) - radii - model.geom_rbound[a]
-        for b in second[gaps <= 0]:
+        for b in others[gaps <= 0]:
             contact = _touch(model, data, pair, a, int(b))
-            if contact is not None and (best is None or contact.distance < best.distance):
-                best = contact
-    return best
+            if contact is not None:
+                yield contact
 
 
 def _touch(model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, a: int, b: int) -> Contact | None:

@@ -35,10 +35,7 @@ _BLOCK = 10_000
 class ContactQueries:
     """Answers for rows of configurations, each (n, dim) and already checked; safe to share between threads.
 
-    Args:
-        compiled: The scene.
-        model: Its model.
-        static: Contacts of the pairs that cannot move, where they are known.
+    `static` are the contacts of the pairs that cannot move, where they are known.
     """
 
     def __init__(self, compiled: Compiled, model: mujoco.MjModel, static: tuple[Contact, ...] | None = None) -> None:
@@ -91,7 +88,7 @@ class ContactQueries:
 
     def link_poses(self, rows: Array) -> Array:
         """Return the world poses of all links, (n, nlinks, 4, 4)."""
-        return self._engine.body_poses(self._space.qpos(rows), self._bodies, self._thread_data())
+        return self._engine.body_poses(self._space.qpos_of_checked(rows), self._bodies, self._thread_data())
 
     def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether any tested pair touches, (n,)."""
@@ -175,7 +172,7 @@ class ContactQueries:
 
     def _hits(self, rows: Array) -> NDArray[np.bool_]:
         """Return what MuJoCo's collision detection says, and containment, (n,)."""
-        hits = self._engine.collide(self._space.qpos(rows), self._thread_data())
+        hits = self._engine.collide(self._space.qpos_of_checked(rows), self._thread_data())
         free = ~hits
         if self._containment.needed and free.any():
             hits[free] = self._containment.inside(self._poses_by_name(rows[free]))
@@ -225,12 +222,13 @@ class ContactQueries:
         return self._pair_of[frozenset((contact.link, contact.other))]
 
     def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches; none if none does."""
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
         exact = self._chosen(engine)
         if exact is not None and not self.collisions(row[None], engine)[0]:
             return []
         found: dict[int, list[Touch]] = {}
-        for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
+        qpos = self._space.qpos_of_checked(row)
+        for a, b, position, normal, distance in self._engine.touching(qpos, self._thread_data()):
             index = self._pair_of[frozenset((a, b))]
             pair = self._pairs[index]
             if not pair.constant:
@@ -330,16 +328,11 @@ def packed(queries: ContactQueries, rows: Array, engine: Engine | None = None) -
 
 
 def joined(parts: Sequence[PackedContacts]) -> PackedContacts:
-    """Put the contacts of consecutive chunks together."""
-    if not parts:
-        return PackedContacts(np.zeros(1, np.int64), np.zeros(0, np.int64), _vectors([]), _vectors([]), np.zeros(0))
+    """Put the contacts of consecutive chunks, one at least, together."""
     counts = np.concatenate([np.diff(p.offsets) for p in parts])
     return PackedContacts(
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
-        np.concatenate([p.pair for p in parts]),
-        np.concatenate([p.position for p in parts]),
-        np.concatenate([p.normal for p in parts]),
-        np.concatenate([p.distance for p in parts]),
+        *(np.concatenate([getattr(p, field) for p in parts]) for field in ("pair", "position", "normal", "distance")),
     )
 
 

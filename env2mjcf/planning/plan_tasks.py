@@ -67,7 +67,7 @@ def plan(
             message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
             resolution is out of range.
     """
-    rows = np.stack([_one(scene, start), _one(scene, goal)])
+    rows = np.stack([scene.space.check_row(start), scene.space.check_row(goal)])
     return plan_through(
         scene, rows, planner=planner, robot=robot, time=time, seed=seed, resolution=resolution, shorten=shorten,
         progress=progress,
@@ -128,13 +128,6 @@ def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks:
         fine_step=max(leg.fine_step for leg in legs),
         seed=seed,
     )
-
-
-def _one(scene: Scene, q: ArrayLike) -> Array:
-    row = scene.space.check(q)
-    if row.ndim != 1:
-        raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({scene.space.dim},)")
-    return row
 
 
 def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:

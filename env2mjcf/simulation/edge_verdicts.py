@@ -14,9 +14,7 @@ from ..contact.edges import EdgeSteps, even_rows
 from ..contact.types import Verdict
 from ..diagnostics import DiagnosticLog
 from ..kinematics.transforms import Array
-from ..system.locks import lasting
 from .scene import Scene
-from .verdicts import Verdicts
 
 Indices = NDArray[np.int64]
 
@@ -65,7 +63,7 @@ class EdgeVerdict:
         start, end: Indices of its nodes.
         valid: Whether nothing is wrong with it.
         checked: Whether it was looked at: not where the file's poses belong to no configuration.
-        proved: Whether it is proved that nothing touches between the checks; None where that was not asked.
+        proved: Whether it is proved that nothing touches between the checks; None without `certified`.
         fraction: Where the first check fails, from 0 at its start to 1 at its end; None where none does.
         at: What is wrong there.
     """
@@ -99,7 +97,7 @@ class EdgeVerdicts:
         valid: (m,) whether nothing is wrong.
         checked: (m,) whether it was looked at.
         stepped: (m,) whether no check failed.
-        proved: (m,) whether it is proved; None where that was not asked.
+        proved: (m,) whether it is proved; None without `certified`.
     """
 
     def __init__(
@@ -147,19 +145,8 @@ class EdgeVerdicts:
             bool(self.checked[index]),
             None if self.proved is None else bool(self.proved[index]),
             fraction if failed else None,
-            self._failed.verdict(int(self._rows[index])) if failed else None,
+            self._scene.explain(self._places[index]) if failed else None,
         )
-
-    @lasting
-    def _rows(self) -> Indices:
-        """Row in `_failed` of each edge that fails a check."""
-        return np.cumsum(np.isfinite(self._fractions)) - 1
-
-    @lasting
-    def _failed(self) -> Verdicts:
-        failed = np.isfinite(self._fractions)
-        labels = [self._edges.labels[i] for i in np.flatnonzero(failed).tolist()]
-        return Verdicts(self._scene, self._places[failed], labels)
 
     def _refuse(self, start: Array, delta: Array, owner: Indices, given: float | None) -> NoReturn:
         """Raise what is to blame for steps without end: the resolution that was given, the file's, or the edges."""

@@ -322,17 +322,7 @@ class Scene:
         with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
         of closed meshes.
 
-        Args:
-            q: Configurations, (dim,) or (n, dim).
-            threads: As for `in_collision`.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Returns:
-            A float, or (n,) floats.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite.
+        q, threads, executor, progress and errors are as for `in_collision`; the answer is a float, or (n,) floats.
         """
         columns = (self.space.check(q),)
         return self._rows(ContactQueries.clearances, columns, threads, executor, progress, kind=np.float64)
@@ -375,17 +365,8 @@ class Scene:
     ) -> PackedContacts:
         """Return the contacts of many configurations as arrays: those of `contacts`, row by row, in its order.
 
-        Contacts are found by Python code, one row at a time: processes make them quicker, threads hardly do.
-
-        Args:
-            q: Configurations, (n, dim).
-            threads: As for `in_collision`.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-            engine: Override the scene's engine.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite, or the engine is unknown or not installed.
+        Contacts are found by Python code, one row at a time: processes make them quicker, threads hardly do. q is
+        (n, dim); the other arguments and errors are as for `in_collision`.
         """
         rows = self.space.check(q)
         if rows.ndim != 2:
@@ -397,7 +378,7 @@ class Scene:
 
         question = Question(packed, (rows,), (_known(engine),), self._solver.row_bytes())
         ask(self._solver, question, store, threads, executor, progress)
-        return joined([parts[start] for start in sorted(parts)])
+        return joined([parts[start] for start in sorted(parts)] or [packed(self._solver, rows)])
 
     # Edges and paths.
 
@@ -468,17 +449,8 @@ class Scene:
 
         True is a proof: distances along the way are compared with how far bodies can move (bounded as for
         `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
-        than 1e-5 of the extent. Joint values in between are not rounded to any step.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-            threads: As for `in_collision`; edges count as rows.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape.
+        than 1e-5 of the extent. Joint values in between are not rounded to any step. Arguments, result and errors are
+        as for `edge_in_collision`.
         """
         return self._rows(ContactQueries.edges_are_free, self._way(q0, q1), threads, executor, progress)
 
@@ -492,19 +464,9 @@ class Scene:
         progress: bool = False,
         engine: Engine | None = None,
     ) -> PathReport:
-        """Check the validity of a path's configurations and of the straight edges between them.
+        """Check the validity of a path's configurations, (k, dim), and of the straight edges between them.
 
-        Args:
-            path: (k, dim).
-            resolution: As for `edge_in_collision`.
-            threads: As for `in_collision`; edges count as rows.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-            engine: Override the scene's engine.
-
-        Raises:
-            ValueError: The path has a wrong shape, the engine is unknown or not installed, or the resolution is not
-                positive, or too small for such edges.
+        The other arguments, and errors, are as for `edge_in_collision`.
         """
         rows = self.space.check(path)
         if rows.ndim != 2:
@@ -650,7 +612,7 @@ class Scene:
 
 
 def _known(engine: Engine | None) -> Engine | None:
-    """Return an engine, or raise a ValueError where there is none of that name."""
+    """Return an engine, or raise a ValueError if it does not exist."""
     if engine is not None and engine not in _ENGINES:
         raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, _ENGINES))}")
     return engine

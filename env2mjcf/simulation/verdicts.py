@@ -107,7 +107,7 @@ def count_touching(scene: Scene, samples: int) -> tuple[PairCount, ...]:
         A count for each pair, in the order of `scene.pairs`.
 
     Raises:
-        ValueError: Fewer than one sample was asked for.
+        ValueError: samples is below 1.
     """
     if samples < 1:
         raise ValueError(f"samples is {samples}; expected at least 1")

@@ -50,12 +50,7 @@ def assert_free(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | No
     """
     __tracebackhide__ = True
     rows = _rows(scene, q)
-    bad = np.flatnonzero(scene.in_collision(rows))
-    if not len(bad):
-        return
-    row = rows[bad[0]]
-    head = _head(scene, row, bad, len(rows), "in collision")
-    raise AssertionError(_message(scene, head, scene.explain(row).contacts, _draw(scene, row[None], picture)))
+    _refuse(scene, rows, np.asarray(scene.in_collision(rows)), "in collision", picture)
 
 
 def assert_valid(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | None = None) -> None:
@@ -65,12 +60,7 @@ def assert_valid(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | N
     """
     __tracebackhide__ = True
     rows = _rows(scene, q)
-    bad = np.flatnonzero(~np.asarray(scene.is_valid(rows)))
-    if not len(bad):
-        return
-    row = rows[bad[0]]
-    head = _head(scene, row, bad, len(rows), "not valid")
-    raise AssertionError(_message(scene, head, scene.explain(row).reasons, _draw(scene, row[None], picture)))
+    _refuse(scene, rows, ~np.asarray(scene.is_valid(rows)), "not valid", picture)
 
 
 def assert_valid_path(
@@ -116,10 +106,20 @@ def _rows(scene: Scene, q: ArrayLike) -> Array:
     return rows
 
 
-def _head(scene: Scene, row: Array, bad: NDArray[np.intp], total: int, what: str) -> str:
-    if total == 1:
-        return f"the configuration is {what}\n  {_values(scene, row)}"
-    return f"{len(bad)} of {total} configurations are {what}; the first is row {bad[0]}\n  {_values(scene, row)}"
+def _refuse(
+    scene: Scene, rows: Array, wrong: NDArray[np.bool_], what: str, picture: str | PathLike[str] | None
+) -> None:
+    """Raise an AssertionError about the first row that is wrong, if any is."""
+    __tracebackhide__ = True
+    if not wrong.any():
+        return
+    first = int(np.argmax(wrong))
+    several = f"{wrong.sum()} of {len(rows)} configurations are {what}; the first is row {first}"
+    head = f"the configuration is {what}" if len(rows) == 1 else several
+    verdict = scene.explain(rows[first])
+    drawn = _draw(scene, rows[first : first + 1], picture)
+    reasons = verdict.contacts if what == "in collision" else verdict.reasons
+    raise AssertionError(_message(scene, f"{head}\n  {_values(scene, rows[first])}", reasons, drawn))
 
 
 def _values(scene: Scene, row: Array) -> str:
@@ -146,7 +146,7 @@ def _message(scene: Scene, head: str, reasons: Sequence[Reason], drawn: str) -> 
 
 
 def _draw(scene: Scene, rows: Array, picture: str | PathLike[str] | None) -> str:
-    """Draw a failure, the last row in full, and say where it lies; a picture that fails is said, and is no failure."""
+    """Draw a failure, the last row in full, and return where it lies, or why there is no picture."""
     target = Path(picture) if picture is not None else _default_picture()
     if target is None:
         return ""

@@ -10,7 +10,7 @@ from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf import Scene
-from env2mjcf.simulation.edge_verdicts import EdgeVerdicts, Edges
+from env2mjcf.simulation.edge_verdicts import Edges, EdgeVerdicts
 from env2mjcf.simulation.verdicts import Verdicts
 
 WALL = box_mesh(0.5, 5.0, 5.0)

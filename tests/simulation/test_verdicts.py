@@ -67,7 +67,7 @@ class TestExplain:
         verdict = arm.explain([9.8, 0, 0, 2.0])
         assert verdict.summary == "out of limits, outside the boundary"
         assert [r.name for r in verdict.limits] == ["cube_2.theta"]
-        assert verdict.outside == ("cube",)
+        assert verdict.outside == ("cube", "cube_2")
 
     def test_the_verdict_is_that_of_is_valid(self, arm: Scene) -> None:
         q = arm.space.sample(300, seed=3) * 1.3

@@ -178,10 +178,9 @@ class Page:
         several = len(self._scene.space.robot_slices) > 1
         with gui.add_folder(f"Robot{f' {number}' if several else ''}{_units(dials)}"):
             for dial in dials:
-                slider = gui.add_slider(
-                    dial.label, dial.low, dial.high, dial.step, dial.low, disabled=dial.low == dial.high,
-                    hint=f"{dial.name}: {'a length as in the file' if dial.length else dial.unit}; {dial.limits}.",
-                )  # fmt: skip
+                hint = f"{dial.name}: {'a length as in the file' if dial.length else dial.unit}; {dial.limits}."
+                ends = dial.low, dial.high, dial.step, dial.low
+                slider = gui.add_slider(dial.label, *ends, disabled=dial.low == dial.high, hint=hint)
                 slider.on_update(self._turned)
                 self._sliders.append(slider)
 

@@ -1,4 +1,4 @@
-"""The viewer: what is shown, and who may change it."""
+"""The viewer: what is shown, and what may change it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .sliders import Dials
 if TYPE_CHECKING:
     import viser
 
-# Draws for one valid configuration before it is said that none was found.
+# Draws for one valid configuration before giving up.
 _DRAWS = 2000
 _TRAIL_POINTS = 240
 
@@ -84,7 +84,7 @@ class Viewer:
             self._newest.submit(q)
 
     def go(self, q: Array) -> None:
-        """Show a configuration that somebody chose: nothing plays any more."""
+        """Show a configuration that a user chose: nothing plays any more."""
         with self._lock:
             self.pause()
             self.show(q)
@@ -147,7 +147,7 @@ class Viewer:
 
     def _tick(self, fraction: float) -> None:
         with self._lock:
-            # Whoever paused it may have shown something else since.
+            # After a pause something else may be shown.
             if self._track is not None and self._player is not None and self._player.playing:
                 self.page.set_fraction(fraction)
                 self.show(self._track.at(fraction))
