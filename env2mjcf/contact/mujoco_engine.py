@@ -23,6 +23,9 @@ class MujocoEngine:
     Args:
         model: The scene's model.
         owners: Name of the body that each collision geom belongs to.
+
+    Attributes:
+        model: The engine's own model; an engine made of it answers alike.
     """
 
     def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str]) -> None:
@@ -32,26 +35,21 @@ class MujocoEngine:
         self._owner = np.full(model.ngeom, -1, dtype=np.int64)
         for geom, owner in owners.items():
             self._owner[model.geom(geom).id] = index[owner]
-        self._model = copy.copy(model)
-        self._model.geom_contype[self._owner < 0] = 0
-        self._model.geom_conaffinity[self._owner < 0] = 0
+        self.model = copy.copy(model)
+        self.model.geom_contype[self._owner < 0] = 0
+        self.model.geom_conaffinity[self._owner < 0] = 0
         # One contact is enough for a verdict, and for where two cells touch. MuJoCo's native algorithm misses some deep
         # overlaps of aligned boxes (coplanar plates that cross), libccd's does not.
         for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
-            self._model.opt.disableflags |= int(flag)
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The model: an engine made of it answers alike."""
-        return self._model
+            self.model.opt.disableflags |= int(flag)
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
-        return mujoco.MjData(self._model)
+        return mujoco.MjData(self.model)
 
     def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
         """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
-        model, kinematics, collision = self._model, mujoco.mj_kinematics, mujoco.mj_collision
+        model, kinematics, collision = self.model, mujoco.mj_kinematics, mujoco.mj_collision
         hits = np.zeros(len(qpos), dtype=bool)
         for i, row in enumerate(qpos):
             data.qpos[:] = row
@@ -63,8 +61,8 @@ class MujocoEngine:
     def touching(self, qpos: Array, data: mujoco.MjData) -> Iterable[tuple[str, str, Array, Array, float]]:
         """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
         data.qpos[:] = qpos
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_collision(self._model, data)
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_collision(self.model, data)
         if not data.ncon:
             return []
         # Iterating data.contact costs more than the query itself.
@@ -82,7 +80,7 @@ class MujocoEngine:
         poses[..., 3, 3] = 1.0
         for i, row in enumerate(qpos):
             data.qpos[:] = row
-            mujoco.mj_kinematics(self._model, data)
+            mujoco.mj_kinematics(self.model, data)
             poses[i, :, :3, :3] = data.xmat[bodies].reshape(-1, 3, 3)
             poses[i, :, :3, 3] = data.xpos[bodies]
         return poses

@@ -61,27 +61,22 @@ def ask(
     rows = question.rows
     count = thread_count(threads, rows)
     bar = tqdm(total=rows, unit="q", delay=1, leave=False) if progress and sys.stderr.isatty() else None
+
+    def noted(rows: slice, answers: Any) -> None:
+        store(rows, answers)
+        if bar is not None:
+            bar.update(rows.stop - rows.start)
+
     try:
         if executor is not None:
             workers = worker_count(executor) if threads is None else count
             chunks = Chunks(rows, workers, question.row_bytes, _LEAST_THERE)
-            on_executor(executor, queries, question, chunks, _noting(store, bar), workers)
+            on_executor(executor, queries, question, chunks, noted, workers)
         elif rows:
-            _in_threads(queries, question, _noting(store, bar), count)
+            _in_threads(queries, question, noted, count)
     finally:
         if bar is not None:
             bar.close()
-
-
-def _noting(store: Store, bar: Any) -> Store:
-    if bar is None:
-        return store
-
-    def both(rows: slice, answers: Any) -> None:
-        store(rows, answers)
-        bar.update(rows.stop - rows.start)
-
-    return both
 
 
 def _in_threads(queries: ContactQueries, question: Question, store: Store, count: int) -> None:
