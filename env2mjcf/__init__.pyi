@@ -23,6 +23,7 @@ from .companions import write_roadmap as write_roadmap
 from .contact.types import Contact as Contact
 from .contact.types import PackedContacts as PackedContacts
 from .contact.types import PathReport as PathReport
+from .contact.types import Verdict as Verdict
 from .conversion import Conversion as Conversion
 from .conversion import convert as convert
 from .errors import ConversionError as ConversionError

@@ -132,7 +132,7 @@ def _robots(environment: Environment, metres: float) -> list[RobotSummary]:
         metres,
         sample_box=(np.zeros(3), np.zeros(3)),  # nothing is drawn, and the obstacles' box needs their meshes
     )
-    lower, upper, home = (space.encode(v) for v in (space.lower, space.upper, space.home))
+    lower, upper, home = (space.in_file_units(v) for v in (space.lower, space.upper, space.home))
     summaries: list[RobotSummary] = []
     for robot, k, own, columns in zip(environment.robots, kinematics, links, space.robot_slices, strict=True):
         turns = RULES[robot.dialect].configuration_angle > 4

@@ -17,7 +17,7 @@ from .printing import one_line
 
 if TYPE_CHECKING:
     from ..report import Report
-    from ..simulation.pair_counts import PairCount
+    from ..simulation.verdicts import PairCount
 
 _UNITS = {"turns": "turns", "pi": "pi rad", "length": "length"}
 

@@ -20,8 +20,8 @@ from .printing import plain, print_diagnostics, print_json, print_parts, working
 from .program import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
-    from ..simulation.pair_counts import PairCount
     from ..simulation.scene import Scene
+    from ..simulation.verdicts import PairCount
     from ..summary import SceneSummary
 
 
@@ -104,7 +104,7 @@ class Info:
                 yield from pairs_part(self._counts(scene), self.samples)
 
     def _counts(self, scene: Scene) -> tuple[PairCount, ...]:
-        from ..simulation.pair_counts import count_touching
+        from ..simulation.verdicts import count_touching
 
         with working(f"looking at {self.samples} configurations"):
             return count_touching(scene, self.samples)

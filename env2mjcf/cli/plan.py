@@ -174,11 +174,10 @@ def dense(scene: Scene, result: Result) -> np.ndarray:
 def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
     """Return which configurations of the query are not valid, and why; None if all are."""
     from ..planning.plan_tasks import names_of
-    from ..simulation.verdicts import Judge
 
-    judge = Judge(scene, query.q, names_of(len(query.q)))
-    found = [judge.verdict(int(i)) for i in np.flatnonzero(~judge.valid)]
-    return [(v.label, v.reasons()) for v in found] or None
+    names = names_of(len(query.q))
+    wrong = [int(i) for i in np.flatnonzero(~scene.valid_rows(query.q))]
+    return [(names[i], tuple(map(str, scene.explain(query.q[i]).reasons))) for i in wrong] or None
 
 
 def _lines(result: Result, written: Path | None) -> Iterator[Text]:

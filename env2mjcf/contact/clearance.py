@@ -21,13 +21,7 @@ _TOUCH_PER_EXTENT = 1e-13
 
 
 class Clearance:
-    """Signed distances over the tested pairs.
-
-    Args:
-        pairs: The tested pairs.
-        surfaces: Of all bodies.
-        extent: The scene's.
-    """
+    """Signed distances over the tested pairs."""
 
     def __init__(self, pairs: tuple[Pair, ...], surfaces: Surfaces, extent: float) -> None:
         self._surfaces = surfaces
@@ -37,12 +31,7 @@ class Clearance:
         self.touch = _TOUCH_PER_EXTENT * extent
 
     def signed(self, poses: Mapping[str, Array], n: int) -> Array:
-        """Return the least signed distance of any pair, (n,); inf without pairs.
-
-        Args:
-            poses: World poses by name, (n, 4, 4) each.
-            n: Number of rows.
-        """
+        """Return the least signed distance of any pair, (n,), for world poses by name, (n, 4, 4); inf without pairs."""
         out = np.full(n, np.inf)
         if not len(self._first) or not n:
             return out

@@ -1,8 +1,8 @@
-"""One body wholly inside another: what surfaces alone do not see."""
+"""What surfaces alone do not see: one body wholly inside another, and links that reach beyond the boundary."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from ..geometry.assembly import Part
 from ..geometry.orientation import winding_numbers
 from ..kinematics.transforms import Array
+from ..model.environment import Boundary
 from ..pairs import Pair
+from .types import Outside
+
+# Of a vertex that lies exactly on the boundary, as a fraction of the boundary's size.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,10 +35,6 @@ class Containment:
     Where surfaces do not cross, a component lies inside a solid whole or not at all, so one of its vertices decides:
     its winding number about the solid's triangles is not zero (Jacobson et al., Robust Inside-Outside Segmentation
     using Generalized Winding Numbers, 2013).
-
-    Args:
-        pairs: The tested pairs.
-        parts: All bodies by name.
     """
 
     def __init__(self, pairs: tuple[Pair, ...], parts: Mapping[str, Part]) -> None:
@@ -51,16 +52,9 @@ class Containment:
         return bool(self._probes)
 
     def inside(self, poses: Mapping[str, Array]) -> NDArray[np.bool_]:
-        """Return whether any body lies inside another, (n,).
-
-        Args:
-            poses: World poses by name, (n, 4, 4) each.
-        """
+        """Return whether any body lies inside another, (n,), for world poses by name, (n, 4, 4) each."""
         n = max((len(p) for p in poses.values()), default=0)
-        found = np.zeros(n, dtype=bool)
-        for probe in self._probes:
-            found |= self._probe(probe, poses)
-        return found
+        return np.logical_or.reduce([np.zeros(n, dtype=bool), *(self._probe(p, poses) for p in self._probes)])
 
     def pairs_inside(self, poses: Mapping[str, Array]) -> list[tuple[int, Array]]:
         """Return (index of the pair, a point of the inner body) for each contained body; poses are (1, 4, 4)."""
@@ -87,3 +81,51 @@ def _component_points(part: Part) -> Array:
     analysis = part.analysis
     _, first = np.unique(analysis.component, return_index=True)
     return analysis.vertices[analysis.faces[first, 0]]
+
+
+class BoundaryTest:
+    """Tests the vertices of links against a boundary, in metres; None accepts everything.
+
+    The boundary is closed; axes that it does not name are unbounded. Poses come in the order of the links.
+    """
+
+    def __init__(self, boundary: Boundary | None, links: Sequence[Part]) -> None:
+        self._boundary, self._names = boundary, [p.name for p in links]
+        self._used = [np.unique(p.mesh.faces) for p in links]
+        self._vertices = [p.mesh.vertices[used] for p, used in zip(links, self._used, strict=True)]
+
+    def inside(self, poses: Array) -> NDArray[np.bool_]:
+        """Return whether every vertex is inside, (n,), for link poses (n, nlinks, 4, 4)."""
+        ok = np.ones(len(poses), dtype=bool)
+        if self._boundary is not None:
+            for i, vertices in enumerate(self._vertices):
+                ok &= (self._beyond(self._boundary, _placed(poses[:, i], vertices)) <= 0).all(axis=1)
+        return ok
+
+    def outside(self, poses: Array) -> list[Outside]:
+        """Return the links that reach beyond the boundary, for link poses (nlinks, 4, 4)."""
+        found: list[Outside] = []
+        if self._boundary is not None:
+            for i, (name, vertices) in enumerate(zip(self._names, self._vertices, strict=True)):
+                world = _placed(poses[i : i + 1], vertices)
+                beyond = self._beyond(self._boundary, world)[0]
+                if (beyond > 0).any():
+                    worst = int(beyond.argmax())
+                    found.append(Outside(name, int(self._used[i][worst]), world[0, worst], float(beyond[worst])))
+        return found
+
+    @staticmethod
+    def _beyond(boundary: Boundary, world: Array) -> Array:
+        """Return how far points (n, v, 3) are outside, (n, v); zero or less inside."""
+        if boundary.lower:
+            axes = len(boundary.lower)
+            lower, upper = np.array(boundary.lower), np.array(boundary.upper)
+            slack = ROUNDING * float(np.max(np.abs([lower, upper])))
+            beyond = np.maximum(lower - slack - world[..., :axes], world[..., :axes] - (upper + slack))
+            return beyond.max(axis=-1)
+        away = np.linalg.norm(world[..., : len(boundary.center)] - boundary.center, axis=-1)
+        return away - boundary.radius * (1 + ROUNDING)
+
+
+def _placed(poses: Array, vertices: Array) -> Array:
+    return np.einsum("nij,vj->nvi", poses[:, :3, :3], vertices) + poses[:, None, :3, 3]

@@ -1,9 +1,4 @@
-"""Edges and paths: configurations close enough together that nothing is passed over.
-
-MERGED: How far bodies can move, and how much nearer they can come to each other, on straight ways.
-
-MERGED: Proof that an edge is free: distances along it, each of which clears a stretch of the way.
-"""
+"""Edges: steps that pass over nothing, bounds of how far bodies move, and the proof that an edge is free."""
 
 from __future__ import annotations
 
@@ -15,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
 from ..kinematics.transforms import Array
-from ..kinematics.tree import Dof, DofKind
+from ..kinematics.tree import DofKind
 from ..pairs import Pair
-from .types import Contact, PathReport
+
+_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
 
 # Without a resolution in the file, a step is this fraction of the extent.
 _DEFAULT_RESOLUTION = 0.01
@@ -27,12 +24,7 @@ _MOST_ROWS = 10_000_000
 
 
 class EdgeSteps:
-    """Cuts straight edges so that no point of a robot moves further than the resolution between two checks.
-
-    Args:
-        assembly: The scene.
-        space: Its configuration space.
-    """
+    """Cuts straight edges so that no point of a robot moves further than the resolution between two checks."""
 
     def __init__(self, assembly: Assembly, space: ConfigurationSpace) -> None:
         self._assembly = assembly
@@ -41,11 +33,11 @@ class EdgeSteps:
 
     @property
     def usual(self) -> float:
-        """The step in metres where nothing is asked for, and the file has none: 0.01 extent."""
+        """The step in metres where neither the caller nor the file gives one: 0.01 extent."""
         return _DEFAULT_RESOLUTION * self._assembly.extent
 
     def resolution(self, resolution: float | None) -> float:
-        """Return the step in metres: what was asked for, else the file's PositionRes, else 0.01 extent.
+        """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
             ValueError: The resolution is not a positive number.
@@ -82,57 +74,23 @@ class EdgeSteps:
 
     def rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None) -> Array:
         """Return the configurations to be checked on an edge, both ends included, (n, dim)."""
-        start, delta = self._space.check(q0), self._space.difference(q0, q1)
-        count = int(self.bounded_counts(start[None], delta[None], resolution)[0])
-        return start + np.linspace(0.0, 1.0, count)[:, None] * delta
+        start, end = self._space.check_row(q0), self._space.check_row(q1)
+        delta = self._space.difference(start, end)
+        count = self.bounded_counts(start[None], delta[None], resolution)
+        return even_rows(start, delta, count, np.arange(count[0]))
 
 
-def check_path(
-    path: ArrayLike,
-    steps: EdgeSteps,
-    is_valid: Callable[[Array], NDArray[np.bool_]],
-    contacts: Callable[[Array], list[Contact]],
-    space: ConfigurationSpace,
-    resolution: float | None,
-) -> PathReport:
-    """Check the configurations of a path and the straight edges between them.
+def even_rows(start: Array, delta: Array, counts: NDArray[np.int64], at: NDArray[np.int64]) -> Array:
+    """Return some of the configurations on ways, (r, dim): of `counts` even ones, ends included, those numbered `at`.
 
-    Raises:
-        ValueError: The path is no (k, dim) array of finite numbers.
+    They are the same to the last bit as those that `numpy.linspace` gives for a whole way.
     """
-    rows = space.check(path)
-    if rows.ndim != 2:
-        raise ValueError(f"a path of shape {rows.shape}; expected (k, {space.dim})")
-    good = is_valid(rows)
-    edges = np.ones(max(0, len(rows) - 1), dtype=bool)
-    first: tuple[int, Array] | None = None
-    for i, row in enumerate(rows):
-        if not good[i]:
-            first = first or (i, row)
-        if i + 1 == len(rows):
-            break
-        between = steps.rows(row, rows[i + 1], resolution)
-        valid = is_valid(between)
-        edges[i] = bool(valid.all())
-        if not edges[i] and first is None:
-            first = (i, between[int(np.argmin(valid))])
-    index, q = first if first else (None, None)
-    touching = tuple(contacts(q)) if q is not None else ()
-    return PathReport(first is None, good, edges, index, q, touching)
-
-
-_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
-_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
+    last = counts - 1
+    return start + np.where(at == last, 1.0, at * (1.0 / last))[:, None] * delta
 
 
 class MotionBounds:
-    """Bounds of motion from distances along the chains of links.
-
-    Args:
-        assembly: The scene.
-        space: Its configuration space.
-        pairs: Pairs of links whose approach is asked for.
-    """
+    """Bounds of motion from distances along the chains of links."""
 
     def __init__(self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair] = ()) -> None:
         self._robots = assembly.robots
@@ -145,7 +103,10 @@ class MotionBounds:
         dofs = [d for r in assembly.robots for d in r.kinematics.dofs]
         self._slides = np.array([d.kind is DofKind.D for d in dofs], dtype=np.bool_)
         self._bases = [
-            (columns.start + np.array([i for i, d in enumerate(r.kinematics.dofs) if d.body == body and _of_base(d)]))
+            (
+                columns.start
+                + np.array([i for i, d in enumerate(r.kinematics.dofs) if d.body == body and d.connection is None])
+            )
             for r, columns in zip(assembly.robots, space.robot_slices, strict=True)
             for body in sorted(r.kinematics.tree.bases)
         ]
@@ -211,7 +172,7 @@ class MotionBounds:
         """Return how far each degree of freedom goes, (n, dim), those of a base taken together.
 
         The translations of a base make one straight line. Its angular velocity is at most the root of
-        (|rx'| + |rz'|)^2 + ry'^2, since the axis of ry is square to the two others (R = Rz Ry Rx).
+        (|rx'| + |rz'|)^2 + ry'^2, since the axis of ry is square to the two others (docs/format/kinematics.md).
         """
         turns = np.abs(delta)
         for columns in self._bases:
@@ -224,10 +185,6 @@ class MotionBounds:
                 x, y, z = about
                 turns[:, x], turns[:, about[1:]] = np.hypot(turns[:, x] + turns[:, z], turns[:, y]), 0.0
         return turns
-
-
-def _of_base(dof: Dof) -> bool:
-    return dof.connection is None
 
 
 def certified(clearance: Callable[[Array], Array], start: Array, delta: Array, motion: float, band: float) -> bool:

@@ -15,13 +15,10 @@ import threading
 import time
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
-
-from numpy.typing import NDArray
 
 from .tasks import Chunks
 
@@ -56,25 +53,13 @@ class Task:
 
     Attributes:
         scene: Digest of the scene; or the queries themselves, which threads of this process share.
-        content: The parcel's content, where a worker has asked for it.
-        function: What to call.
-        columns: Its arguments, one entry for each row.
-        extras: More arguments.
+        content: The parcel's content, where a worker lacks it.
+        question: The question, with the columns of these rows.
     """
 
     scene: Any
     content: bytes | None
-    function: Callable[..., Any]
-    columns: tuple[NDArray[Any], ...]
-    extras: tuple[Any, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reply:
-    """Answers of a task, and the seconds of work that they took."""
-
-    answers: Any
-    seconds: float
+    question: Question
 
 
 class _Memory:
@@ -118,14 +103,14 @@ def parcel(queries: ContactQueries) -> Parcel:
     return made
 
 
-def answer(task: Task) -> Reply | None:
-    """Work on a task, in a worker; None asks for the scene's content."""
+def answer(task: Task) -> tuple[Any, float] | None:
+    """Return a task's answers, and the seconds that they took, in a worker; None asks for the scene's content."""
     queries = _memory.find(task.scene, task.content) if isinstance(task.scene, str) else task.scene
     if queries is None:
         return None
     began = time.perf_counter()
-    answers = task.function(queries, *task.columns, *task.extras)
-    return Reply(answers, time.perf_counter() - began)
+    answers = task.question.answers(queries, slice(None))
+    return answers, time.perf_counter() - began
 
 
 def worker_count(executor: Any) -> int:
@@ -149,8 +134,8 @@ def on_executor(
         BrokenExecutor: A worker process died, and the executor does not replace it. (Dask's does.)
     """
     if not callable(getattr(executor, "submit", None)):
-        raise TypeError(f"executor is a {type(executor).__name__}; expected a concurrent.futures.Executor, such as "
-                        "ProcessPoolExecutor() or dask.distributed.Client(...).get_executor()")  # fmt: skip
+        expected = "a concurrent.futures.Executor, such as ProcessPoolExecutor() or dask's Client(...).get_executor()"
+        raise TypeError(f"executor is a {type(executor).__name__}; expected {expected}")
     # Derived classes may be something else: interpreters share no objects.
     here = type(executor) is ThreadPoolExecutor
     scene = queries if here else parcel(queries).digest
@@ -162,8 +147,7 @@ def on_executor(
     try:
         while True:
             while len(running) < 2 * workers + 1 and (rows := chunks.take()) is not None:
-                columns = tuple(c[rows] for c in question.columns)
-                send(Task(scene, None, question.function, columns, question.extras), rows)
+                send(Task(scene, None, question.part(rows)), rows)
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -172,8 +156,9 @@ def on_executor(
                 if reply is None:
                     send(dataclasses.replace(task, content=parcel(queries).content), rows)
                 else:
-                    store(rows, reply.answers)
-                    chunks.took(rows.stop - rows.start, reply.seconds)
+                    answers, seconds = reply
+                    store(rows, answers)
+                    chunks.took(rows.stop - rows.start, seconds)
     except BrokenExecutor as error:
         raise type(error)(
             "a worker of the executor died, and with it the executor: make a new one and ask again. Usual reasons: "

@@ -42,13 +42,6 @@ class Manifolds:
     Contacts of two hulls are MuJoCo's own. The normals and depths of thin surface cells mean nothing, so those of
     surfaces come from the triangles that touch: the normal is that of one of the two faces, and the depth how far to
     push the link's triangle against it until it is beside the other. Bodies inside others are pushed out.
-
-    Args:
-        pairs: The tested pairs.
-        parts: All bodies by name.
-        surfaces: Their triangles.
-        clearance: Their distances.
-        extent: The scene's.
     """
 
     def __init__(

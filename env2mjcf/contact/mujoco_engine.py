@@ -1,12 +1,9 @@
-"""MuJoCo's own collision detection as an engine of verdicts and contacts.
-
-MERGED: Pairs that cannot move against each other: decided once, and added to every answer.
-"""
+"""MuJoCo's own collision detection: verdicts, contacts, and the pairs that cannot move, which are decided once."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -14,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kinematics.transforms import Array
 from ..pairs import Pair
-from .types import Contact
+from .types import Contact, deepest
 
 
 class MujocoEngine:
@@ -26,6 +23,9 @@ class MujocoEngine:
     Args:
         model: The scene's model.
         owners: Name of the body that each collision geom belongs to.
+
+    Attributes:
+        model: The engine's own model; an engine made of it answers alike.
     """
 
     def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str]) -> None:
@@ -35,26 +35,21 @@ class MujocoEngine:
         self._owner = np.full(model.ngeom, -1, dtype=np.int64)
         for geom, owner in owners.items():
             self._owner[model.geom(geom).id] = index[owner]
-        self._model = copy.copy(model)
-        self._model.geom_contype[self._owner < 0] = 0
-        self._model.geom_conaffinity[self._owner < 0] = 0
+        self.model = copy.copy(model)
+        self.model.geom_contype[self._owner < 0] = 0
+        self.model.geom_conaffinity[self._owner < 0] = 0
         # One contact is enough for a verdict, and for where two cells touch. MuJoCo's native algorithm misses some deep
         # overlaps of aligned boxes (coplanar plates that cross), libccd's does not.
         for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
-            self._model.opt.disableflags |= int(flag)
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The model that is asked: an engine made of it answers alike."""
-        return self._model
+            self.model.opt.disableflags |= int(flag)
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
-        return mujoco.MjData(self._model)
+        return mujoco.MjData(self.model)
 
     def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
         """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
-        model, kinematics, collision = self._model, mujoco.mj_kinematics, mujoco.mj_collision
+        model, kinematics, collision = self.model, mujoco.mj_kinematics, mujoco.mj_collision
         hits = np.zeros(len(qpos), dtype=bool)
         for i, row in enumerate(qpos):
             data.qpos[:] = row
@@ -66,8 +61,8 @@ class MujocoEngine:
     def touching(self, qpos: Array, data: mujoco.MjData) -> Iterable[tuple[str, str, Array, Array, float]]:
         """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
         data.qpos[:] = qpos
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_collision(self._model, data)
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_collision(self.model, data)
         if not data.ncon:
             return []
         # Iterating data.contact costs more than the query itself.
@@ -85,7 +80,7 @@ class MujocoEngine:
         poses[..., 3, 3] = 1.0
         for i, row in enumerate(qpos):
             data.qpos[:] = row
-            mujoco.mj_kinematics(self._model, data)
+            mujoco.mj_kinematics(self.model, data)
             poses[i, :, :3, :3] = data.xmat[bodies].reshape(-1, 3, 3)
             poses[i, :, :3, 3] = data.xpos[bodies]
         return poses
@@ -94,41 +89,24 @@ class MujocoEngine:
 def static_contacts(
     model: mujoco.MjModel, data: mujoco.MjData, pairs: tuple[Pair, ...], owners: Mapping[str, str]
 ) -> tuple[Contact, ...]:
-    """Return the contacts of all constant pairs, the deepest of each.
-
-    Args:
-        model: The scene's model.
-        data: Its data, with kinematics at any configuration.
-        pairs: The tested pairs.
-        owners: Name of the body that each collision geom belongs to.
-    """
+    """Return the contacts of all constant pairs, the deepest of each; `data` has kinematics at any configuration."""
     geoms: dict[str, list[int]] = {}
     for geom, owner in owners.items():
         geoms.setdefault(owner, []).append(int(model.geom(geom).id))
-    found: list[Contact] = []
-    for pair in pairs:
-        if pair.constant:
-            contact = _deepest(model, data, pair, geoms.get(pair.link, []), geoms.get(pair.other, []))
-            if contact is not None:
-                found.append(contact)
-    return tuple(found)
+    constant = [p for p in pairs if p.constant and p.link in geoms and p.other in geoms]
+    return deepest(c for p in constant for c in _touches(model, data, p, geoms[p.link], np.array(geoms[p.other])))
 
 
-def _deepest(
-    model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, mine: list[int], others: list[int]
-) -> Contact | None:
-    best: Contact | None = None
-    if not mine or not others:
-        return None
-    second = np.array(others)
-    centers, radii = data.geom_xpos[second], model.geom_rbound[second]
+def _touches(
+    model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, mine: list[int], others: NDArray[np.int64]
+) -> Iterator[Contact]:
+    centers, radii = data.geom_xpos[others], model.geom_rbound[others]
     for a in mine:
         gaps = np.linalg.norm(centers - data.geom_xpos[a], axis=1) - radii - model.geom_rbound[a]
-        for b in second[gaps <= 0]:
+        for b in others[gaps <= 0]:
             contact = _touch(model, data, pair, a, int(b))
-            if contact is not None and (best is None or contact.distance < best.distance):
-                best = contact
-    return best
+            if contact is not None:
+                yield contact
 
 
 def _touch(model: mujoco.MjModel, data: mujoco.MjData, pair: Pair, a: int, b: int) -> Contact | None:

@@ -17,27 +17,25 @@ from ..kinematics.transforms import Array
 from ..options import Collision, Engine
 from ..pipeline import Compiled
 from ..system.locks import Lock, lasting
-from .boundary import BoundaryTest
 from .clearance import Clearance
-from .containment import Containment
-from .edges import EdgeSteps, MotionBounds, certified
+from .containment import BoundaryTest, Containment
+from .edges import EdgeSteps, MotionBounds, certified, even_rows
 from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
 from .mujoco_engine import MujocoEngine, static_contacts
 from .surfaces import Surfaces
-from .types import Contact, PackedContacts
+from .types import BrokenLimit, Contact, PackedContacts, Reason, Verdict, deepest
 
 # Bodies nearer than this, in extents, may touch by the verdicts.
 _BAND = 1e-5
+# Configurations of edges that are made at once.
+_BLOCK = 10_000
 
 
 class ContactQueries:
     """Answers for rows of configurations, each (n, dim) and already checked; safe to share between threads.
 
-    Args:
-        compiled: The scene.
-        model: Its model.
-        static: Contacts of the pairs that cannot move, where they are known.
+    `static` are the contacts of the pairs that cannot move, where they are known.
     """
 
     def __init__(self, compiled: Compiled, model: mujoco.MjModel, static: tuple[Contact, ...] | None = None) -> None:
@@ -90,7 +88,7 @@ class ContactQueries:
 
     def link_poses(self, rows: Array) -> Array:
         """Return the world poses of all links, (n, nlinks, 4, 4)."""
-        return self._engine.body_poses(self._space.qpos(rows), self._bodies, self._thread_data())
+        return self._engine.body_poses(self._space.qpos_of_checked(rows), self._bodies, self._thread_data())
 
     def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
         """Return whether any tested pair touches, (n,)."""
@@ -124,9 +122,11 @@ class ContactQueries:
             out[touching] = self._triangles.clearance.signed(self._poses_by_name(rows[touching]), int(touching.sum()))
         return out
 
-    def edges_collide(self, start: Array, delta: Array, resolution: float) -> NDArray[np.bool_]:
+    def edges_collide(
+        self, start: Array, delta: Array, resolution: float, engine: Engine | None = None
+    ) -> NDArray[np.bool_]:
         """Return whether anything touches at even steps of such a length of ways from (e, dim) by (e, dim), (e,)."""
-        exact = self._chosen(None)
+        exact = self._chosen(engine)
         if self._always:
             return np.ones(len(start), dtype=bool)
         steps = self.steps.bounded_counts(start, delta, resolution)
@@ -134,6 +134,22 @@ class ContactQueries:
             return exact.edges_collide(start, delta, steps)
         ways = zip(start, delta, steps, strict=True)
         return np.array([self._hits(a + np.linspace(0, 1, n)[:, None] * d).any() for a, d, n in ways], dtype=bool)
+
+    def first_invalid(
+        self, start: Array, delta: Array, counts: NDArray[np.int64], engine: Engine | None = None
+    ) -> NDArray[np.int64]:
+        """Return which of `counts` even steps of ways from (e, dim) by (e, dim) is not valid first, (e,), or -1."""
+        first = np.full(len(start), -1)
+        stops = np.cumsum(counts)
+        for begin in range(0, int(counts.sum()), _BLOCK):
+            row = np.arange(begin, min(begin + _BLOCK, int(stops[-1])))
+            edge = np.searchsorted(stops, row, side="right")
+            row, edge = row[first[edge] < 0], edge[first[edge] < 0]
+            at = row - (stops - counts)[edge]
+            bad = np.flatnonzero(~self.validities(even_rows(start[edge], delta[edge], counts[edge], at), engine))
+            edges, which = np.unique(edge[bad], return_index=True)
+            first[edges] = at[bad[which]]
+        return first
 
     def edges_are_free(self, start: Array, delta: Array) -> NDArray[np.bool_]:
         """Return whether the ways from (e, dim) by (e, dim) are provably free, (e,)."""
@@ -156,7 +172,7 @@ class ContactQueries:
 
     def _hits(self, rows: Array) -> NDArray[np.bool_]:
         """Return what MuJoCo's collision detection says, and containment, (n,)."""
-        hits = self._engine.collide(self._space.qpos(rows), self._thread_data())
+        hits = self._engine.collide(self._space.qpos_of_checked(rows), self._thread_data())
         free = ~hits
         if self._containment.needed and free.any():
             hits[free] = self._containment.inside(self._poses_by_name(rows[free]))
@@ -182,7 +198,7 @@ class ContactQueries:
         """Return the exact engine if it is chosen: `auto` takes it where it can be compiled.
 
         Raises:
-            ValueError: It is asked for by name, and numba is not installed.
+            ValueError: It is chosen by name, and numba is not installed.
         """
         # What a scene has chosen for itself, and made, is handed out at once: a verdict may take less than finding it.
         if engine is None and self._ready is not None:
@@ -206,12 +222,13 @@ class ContactQueries:
         return self._pair_of[frozenset((contact.link, contact.other))]
 
     def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
-        """Return the contacts of one configuration, (dim,): a few for each pair that touches; none if none does."""
+        """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
         exact = self._chosen(engine)
         if exact is not None and not self.collisions(row[None], engine)[0]:
             return []
         found: dict[int, list[Touch]] = {}
-        for a, b, position, normal, distance in self._engine.touching(self._space.qpos(row), self._thread_data()):
+        qpos = self._space.qpos_of_checked(row)
+        for a, b, position, normal, distance in self._engine.touching(qpos, self._thread_data()):
             index = self._pair_of[frozenset((a, b))]
             pair = self._pairs[index]
             if not pair.constant:
@@ -228,6 +245,19 @@ class ContactQueries:
             # Within the band of contact, cells may part what triangles say touches.
             others = self._triangles.clearance.nearest_pairs(poses)
         return self._triangles.manifolds.contacts(found, others, poses)
+
+    def out_of_bounds(self, row: Array) -> tuple[Reason, ...]:
+        """Return the limits that one configuration, (dim,), breaks, and the links that reach beyond the boundary."""
+        space = self._space
+        limits = [
+            BrokenLimit(space.names[i], float(row[i]), float(space.lower[i]), float(space.upper[i]))
+            for i in np.flatnonzero(space.broken(row))
+        ]
+        return *limits, *self._boundary.outside(self.link_poses(row[None])[0])
+
+    def explain(self, row: Array, engine: Engine | None = None) -> Verdict:
+        """Return all that is wrong with one configuration, (dim,)."""
+        return Verdict(row, (*deepest(self.contacts(row, engine)), *self.out_of_bounds(row)))
 
     def contacts_of_poses(self, poses: Array) -> list[Contact]:
         """Return the contacts of links that stand anywhere, (nlinks, 4, 4), found on triangles."""
@@ -260,7 +290,7 @@ class ContactQueries:
 
     @property
     def _triangles(self) -> _Triangles:
-        # Built when it is first asked for: verdicts do without it.
+        # Built at its first use: verdicts do without it.
         with self._lock:
             if self._of_triangles is None:
                 surfaces = self._surfaces
@@ -298,16 +328,11 @@ def packed(queries: ContactQueries, rows: Array, engine: Engine | None = None) -
 
 
 def joined(parts: Sequence[PackedContacts]) -> PackedContacts:
-    """Put the contacts of consecutive chunks together."""
-    if not parts:
-        return PackedContacts(np.zeros(1, np.int64), np.zeros(0, np.int64), _vectors([]), _vectors([]), np.zeros(0))
+    """Put the contacts of consecutive chunks, one at least, together."""
     counts = np.concatenate([np.diff(p.offsets) for p in parts])
     return PackedContacts(
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
-        np.concatenate([p.pair for p in parts]),
-        np.concatenate([p.position for p in parts]),
-        np.concatenate([p.normal for p in parts]),
-        np.concatenate([p.distance for p in parts]),
+        *(np.concatenate([getattr(p, field) for p in parts]) for field in ("pair", "position", "normal", "distance")),
     )
 
 

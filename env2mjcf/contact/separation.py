@@ -37,7 +37,7 @@ class _Trials:
 
 
 def separations(surfaces: Surfaces, jobs: Jobs, touching: Ints, touch: float) -> tuple[Floats, Floats]:
-    """Return how far to push mesh a of each job clear of b, (j,), and whither, (j, 3) unit, in the frame of a.
+    """Return how far to push mesh a of each job clear of b, (j,), and in which direction, (j, 3), in the frame of a.
 
     Every push really separates the pair, so this never falls short of the shortest translation that does. Convex
     pairs are pushed along the face normals of both and square to their edges, which finds the shortest one (but of

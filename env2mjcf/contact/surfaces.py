@@ -45,12 +45,7 @@ class Surface:
 
 
 class Surfaces:
-    """The surfaces of all bodies, and a tree over each.
-
-    Args:
-        parts: Bodies by name; those without a shape are left out.
-        collision: How the scene collides.
-    """
+    """The surfaces of all bodies that have a shape, and a tree over each."""
 
     def __init__(self, parts: Mapping[str, Part], collision: Collision) -> None:
         self.index: dict[str, int] = {}

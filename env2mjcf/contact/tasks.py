@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-# A task of this length is long beside what it costs to hand out, and short for who waits for Ctrl-C.
+# A task of this length is long beside what it costs to hand out, and short for a user who presses Ctrl-C.
 _SECONDS = 0.2
 # Nothing is known about the first rows, so they are few; from one chunk to the next grows by no more than this.
 _FIRST = 64
@@ -86,6 +87,14 @@ class Question:
     def rows(self) -> int:
         """How many rows there are."""
         return len(self.columns[0])
+
+    def part(self, rows: slice) -> Question:
+        """Return the question about some rows."""
+        return dataclasses.replace(self, columns=tuple(c[rows] for c in self.columns))
+
+    def answers(self, queries: Any, rows: slice) -> Any:
+        """Return the answers of a scene's queries for some rows."""
+        return self.function(queries, *(c[rows] for c in self.columns), *self.extras)
 
 
 # Takes where a chunk lies, and its answers.

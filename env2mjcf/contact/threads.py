@@ -24,10 +24,10 @@ _LEAST_HERE, _LEAST_THERE = 0.002, 0.02
 
 
 def thread_count(threads: int | None, rows: int) -> int:
-    """Return how many threads to use: as many as asked for, else 1 for few rows and all cores for many.
+    """Return how many threads to use: as many as given, else 1 for few rows and all cores for many.
 
     Raises:
-        ValueError: Fewer than one thread was asked for.
+        ValueError: The number of threads is below 1.
     """
     if threads is None:
         return 1 if rows < _ROWS_FOR_THREADS else os.cpu_count() or 1
@@ -47,41 +47,36 @@ def ask(
     """Store the answers to a question.
 
     Args:
-        queries: Who answers.
+        queries: What answers it.
         question: What is asked.
-        store: Is given the answers of each chunk, chunks in any order, and may be called in several threads.
+        store: Gets the answers of each chunk, chunks in any order, and may be called in several threads.
         threads: See `thread_count`; with an executor, how many of its workers to keep busy, None: all of them.
         executor: Where to work.
         progress: Whether to show a progress bar on a terminal.
 
     Raises:
-        ValueError: Fewer than one thread was asked for.
-        TypeError: The executor is none.
+        ValueError: The number of threads is below 1.
+        TypeError: The executor is not an Executor.
     """
     rows = question.rows
     count = thread_count(threads, rows)
     bar = tqdm(total=rows, unit="q", delay=1, leave=False) if progress and sys.stderr.isatty() else None
+
+    def noted(rows: slice, answers: Any) -> None:
+        store(rows, answers)
+        if bar is not None:
+            bar.update(rows.stop - rows.start)
+
     try:
         if executor is not None:
             workers = worker_count(executor) if threads is None else count
             chunks = Chunks(rows, workers, question.row_bytes, _LEAST_THERE)
-            on_executor(executor, queries, question, chunks, _noting(store, bar), workers)
+            on_executor(executor, queries, question, chunks, noted, workers)
         elif rows:
-            _in_threads(queries, question, _noting(store, bar), count)
+            _in_threads(queries, question, noted, count)
     finally:
         if bar is not None:
             bar.close()
-
-
-def _noting(store: Store, bar: Any) -> Store:
-    if bar is None:
-        return store
-
-    def both(rows: slice, answers: Any) -> None:
-        store(rows, answers)
-        bar.update(rows.stop - rows.start)
-
-    return both
 
 
 def _in_threads(queries: ContactQueries, question: Question, store: Store, count: int) -> None:
@@ -94,7 +89,7 @@ def _in_threads(queries: ContactQueries, question: Question, store: Store, count
             while (rows := chunks.take()) is not None:
                 began = time.perf_counter()
                 with working():
-                    store(rows, question.function(queries, *(c[rows] for c in question.columns), *question.extras))
+                    store(rows, question.answers(queries, rows))
                 chunks.took(rows.stop - rows.start, time.perf_counter() - began)
         finally:
             # After an error, or Ctrl-C in this thread, the others end with the chunk that they are at.
@@ -106,7 +101,7 @@ def _in_threads(queries: ContactQueries, question: Question, store: Store, count
         except BaseException as error:
             errors.append(error)
 
-    # Not those of an executor, which the interpreter waits for at its end: these are daemons if the one that asks is.
+    # Not those of an executor, which the interpreter waits for at its end: these are daemons if the calling thread is.
     started: list[threading.Thread] = []
     try:
         for number in range(1, count):

@@ -1,13 +1,21 @@
-"""What a contact query answers with."""
+"""What contact queries return: contacts, verdicts with their reasons, reports on paths."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..pairs import ContactKind
+
+# What type checkers can tell of configurations. An array of unknown shape passes for one of any shape: so overloads
+# begin with a shape that no configurations have.
+UnknownShape: TypeAlias = np.ndarray[tuple[int, int, int], np.dtype[Any]]
+OneRow: TypeAlias = Sequence[float] | np.ndarray[tuple[int], np.dtype[Any]]
+Rows: TypeAlias = Sequence[Sequence[float]] | Sequence[NDArray[Any]] | np.ndarray[tuple[int, int], np.dtype[Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +39,100 @@ class Contact:
     position: NDArray[np.float64]
     normal: NDArray[np.float64]
     distance: float
+
+    def __str__(self) -> str:
+        return f"{self.link} and {self.other} ({self.kind}): {self.depth} at ({_numbers(self.position)})"
+
+    @property
+    def depth(self) -> str:
+        """How deep the bodies are in each other, in words."""
+        return f"{-self.distance:.3g} m deep" if self.distance < 0 else "touching"
+
+
+def deepest(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
+    """Return the deepest contact of each pair, pairs in the order in which they come."""
+    found: dict[tuple[str, str], Contact] = {}
+    for contact in contacts:
+        pair = (contact.link, contact.other)
+        if pair not in found or contact.distance < found[pair].distance:
+            found[pair] = contact
+    return tuple(found.values())
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenLimit:
+    """A degree of freedom beyond its limits, in radians or metres."""
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+
+    def __str__(self) -> str:
+        return f"{self.name} is {self.value:.6g}; limits {self.lower:.6g} to {self.upper:.6g}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outside:
+    """A link that reaches beyond the boundary.
+
+    Attributes:
+        link: Its name.
+        vertex: Index, in the link's mesh, of the vertex that is farthest outside.
+        position: (3,) where that vertex is, world frame, metres.
+        distance: How far outside it is, metres.
+    """
+
+    link: str
+    vertex: int
+    position: NDArray[np.float64]
+    distance: float
+
+    def __str__(self) -> str:
+        return f"{self.link} reaches {self.distance:.3g} m outside the boundary, to ({_numbers(self.position)})"
+
+
+Reason: TypeAlias = Contact | BrokenLimit | Outside
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """Whether a configuration is valid, and all that is wrong with it.
+
+    Attributes:
+        q: (dim,) the configuration, radians and metres.
+        reasons: What is wrong: the deepest contact of each pair that touches, limits that are broken, links that reach
+            beyond the boundary. `str(reason)` says it in words.
+    """
+
+    q: NDArray[np.float64]
+    reasons: tuple[Reason, ...]
+
+    @property
+    def valid(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.reasons
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The deepest contact of each pair that touches."""
+        return tuple(r for r in self.reasons if isinstance(r, Contact))
+
+    @property
+    def limits(self) -> tuple[BrokenLimit, ...]:
+        """The limits that are broken."""
+        return tuple(r for r in self.reasons if isinstance(r, BrokenLimit))
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """Names of the links that reach beyond the boundary."""
+        return tuple(r.link for r in self.reasons if isinstance(r, Outside))
+
+    @property
+    def summary(self) -> str:
+        """What kinds of things are wrong, in words; empty where nothing is."""
+        told = {"in collision": self.contacts, "out of limits": self.limits, "outside the boundary": self.outside}
+        return ", ".join(what for what, so in told.items() if so)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,3 +180,7 @@ class PathReport:
     first_invalid: int | None
     invalid_q: NDArray[np.float64] | None
     contacts: tuple[Contact, ...]
+
+
+def _numbers(position: NDArray[np.float64]) -> str:
+    return ", ".join(f"{x:.6g}" for x in position)

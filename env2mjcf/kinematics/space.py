@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
 from .forward import RobotKinematics
 from .transforms import Array, angles_from_quaternion, quaternion_from_angles, wrap
 from .tree import POSITIONS, DofKind
+
+# More names than these are not listed in a message.
+_LISTED = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,41 @@ class Slot:
     columns: tuple[int, ...]
     address: int
     free: bool
+
+
+def real_array(values: ArrayLike, what: str, names: Sequence[str] = ()) -> Array:
+    """Return finite real numbers as float64: how every array is checked that a public function takes.
+
+    Args:
+        values: The array, or what becomes one.
+        what: What it is called in messages.
+        names: What the entries of its last axis are called.
+
+    Raises:
+        ValueError: It holds text, complex numbers, objects or masked entries, a NaN or an infinity.
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        array = values
+    else:
+        try:
+            found = np.asarray(values)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{what} is not an array of numbers: {error}") from error
+        rows = values if found.ndim > 1 and isinstance(values, list | tuple) else (values,)
+        if any(isinstance(row, np.ma.MaskedArray) for row in rows):
+            raise ValueError(f"{what} is a masked array; expected plain numbers")
+        if found.dtype.kind not in "biuf":
+            raise ValueError(f"{what} holds values of type {found.dtype}; expected real numbers")
+        array = found.astype(np.float64, copy=False)
+    finite = np.isfinite(array)
+    if not finite.all():
+        where = tuple(np.argwhere(~finite)[0].tolist())
+        subject, row = f"{what} holds", where
+        if where and array.shape[-1] == len(names):
+            subject, row = f"{names[where[-1]]} is", where[:-1]
+        at = f" in row {', '.join(map(str, row))}" if row else ""
+        raise ValueError(f"{subject} {array[where]}{at}; expected a finite number")
+    return array
 
 
 class ConfigurationSpace:
@@ -106,22 +144,22 @@ class ConfigurationSpace:
         Raises:
             ValueError: The shape is wrong, or a value is not finite; the message names the degree of freedom.
         """
-        try:
-            values = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"q holds something that is no number: {error}") from error
+        values = real_array(q, "q", self.names)
         if values.ndim not in (1, 2) or values.shape[-1] != self.dim:
-            listed = ", ".join(self.names[:12]) + (", ..." if self.dim > 12 else "")
-            raise ValueError(
-                f"configurations of shape {values.shape}; expected ({self.dim},) or (n, {self.dim})"
-                f"{f': {listed}' if self.dim else ''}"
-            )
-        finite = np.isfinite(values)
-        if not finite.all():
-            where = np.argwhere(~finite)[0]
-            row = f" in row {where[0]}" if values.ndim == 2 else ""
-            raise ValueError(f"{self.names[where[-1]]} is {values[tuple(where)]}{row}; expected a finite number")
+            expected = f"({self.dim},) or (n, {self.dim}){self._listed()}"
+            raise ValueError(f"configurations of shape {values.shape}; expected {expected}")
         return values
+
+    def check_row(self, q: ArrayLike) -> Array:
+        """Return one configuration as `check` does, (dim,).
+
+        Raises:
+            ValueError: As for `check`, or there are several.
+        """
+        row = self.check(q)
+        if row.ndim != 1:
+            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.dim},)")
+        return row
 
     def decode(self, cfg: ArrayLike) -> Array:
         """Turn the file's numbers (..., dim) into q: turns (dialect A) or fractions of pi, and raw lengths."""
@@ -130,6 +168,10 @@ class ConfigurationSpace:
     def encode(self, q: ArrayLike) -> Array:
         """Turn q (..., dim) into the file's numbers."""
         return self._last_axis(q, "q") / self._units
+
+    def in_file_units(self, limits: Array) -> Array:
+        """Turn limits (..., dim), which may be infinite, into the file's numbers."""
+        return limits / self._units
 
     def of_task(self, task: Task) -> Array:
         """Return a task's configurations, (k, dim), with the other robots at home."""
@@ -140,9 +182,12 @@ class ConfigurationSpace:
 
     def qpos(self, q: ArrayLike) -> Array:
         """Turn q (..., dim) into MuJoCo's qpos (..., nq)."""
-        values = self._last_axis(q, "q")
+        return self.qpos_of_checked(self._last_axis(q, "q"))
+
+    def qpos_of_checked(self, values: Array) -> Array:
+        """Return `qpos` of configurations that were checked before: for loops in which every microsecond counts."""
         qpos = np.zeros((*values.shape[:-1], self.nq))
-        for slot in self._all_slots():
+        for slot in chain.from_iterable(self._slots):
             if not slot.free:
                 qpos[..., slot.address] = values[..., slot.columns[0]]
                 continue
@@ -158,11 +203,11 @@ class ConfigurationSpace:
         Angles of a free base are the representatives nearest zero; loop-closing degrees of freedom, which qpos does
         not hold, are those of home.
         """
-        values = np.asarray(qpos, dtype=np.float64)
+        values = real_array(qpos, "qpos")
         if values.shape[-1:] != (self.nq,):
             raise ValueError(f"qpos of shape {values.shape}; expected (..., {self.nq})")
         q = np.broadcast_to(self.home, (*values.shape[:-1], self.dim)).copy()
-        for slot in self._all_slots():
+        for slot in chain.from_iterable(self._slots):
             if not slot.free:
                 q[..., slot.columns[0]] = values[..., slot.address]
                 continue
@@ -206,9 +251,8 @@ class ConfigurationSpace:
         """
         if n < 2:
             raise ValueError(f"n is {n}; expected at least 2, for both ends")
-        start, delta = self.check(q0), self.difference(q0, q1)
-        if delta.ndim != 1 or start.ndim != 1:
-            raise ValueError(f"q0 and q1 of shapes {np.shape(q0)} and {np.shape(q1)}; expected two of ({self.dim},)")
+        start, end = self.check_row(q0), self.check_row(q1)
+        delta = self.difference(start, end)
         return start + np.linspace(0.0, 1.0, n)[:, None] * delta
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Array:
@@ -246,12 +290,15 @@ class ConfigurationSpace:
             self.lower[self._axis == axis] = low[axis]
             self.upper[self._axis == axis] = high[axis]
 
-    def _all_slots(self) -> Iterator[Slot]:
-        for robot in self._slots:
-            yield from robot
+    def __repr__(self) -> str:
+        return f"<ConfigurationSpace of {self.dim} degrees of freedom{self._listed()}>"
+
+    def _listed(self) -> str:
+        more = ", ..." if self.dim > _LISTED else ""
+        return f": {', '.join(self.names[:_LISTED])}{more}" if self.dim else ""
 
     def _last_axis(self, values: ArrayLike, what: str) -> Array:
-        array = np.asarray(values, dtype=np.float64)
+        array = real_array(values, what, self.names)
         if array.shape[-1:] != (self.dim,):
             raise ValueError(f"{what} of shape {array.shape}; expected (..., {self.dim})")
         return array

@@ -14,7 +14,6 @@ from ..diagnostics import DiagnosticLog
 from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
-from ..simulation.verdicts import Judge
 from ..system.locks import Lock
 from .planner_space import PlanningSpace
 from .planners import known
@@ -68,7 +67,7 @@ def plan(
             message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
             resolution is out of range.
     """
-    rows = np.stack([_one(scene, start), _one(scene, goal)])
+    rows = np.stack([scene.space.check_row(start), scene.space.check_row(goal)])
     return plan_through(
         scene, rows, planner=planner, robot=robot, time=time, seed=seed, resolution=resolution, shorten=shorten,
         progress=progress,
@@ -131,13 +130,6 @@ def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks:
     )
 
 
-def _one(scene: Scene, q: ArrayLike) -> Array:
-    row = scene.space.check(q)
-    if row.ndim != 1:
-        raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({scene.space.dim},)")
-    return row
-
-
 def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
     every = np.arange(scene.space.dim)
     return every if robot is None else every[scene.space.robot_slices[robot]]
@@ -152,7 +144,7 @@ def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
 
 def _step(scene: Scene, resolution: float | None) -> float:
     """Return the planner's step in metres."""
-    step = scene.step(None if resolution is None else positive("resolution", resolution))
+    step = scene.resolution(None if resolution is None else positive("resolution", resolution))
     least = _FINEST * scene.extent
     if step >= least:
         return step
@@ -181,10 +173,9 @@ def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int
 
 def _refuse_invalid(scene: Scene, rows: Array) -> None:
     """Raise a ValueError that says who touches in the first configuration that is not valid."""
-    judge = Judge(scene, rows, names_of(len(rows)))
-    for i in np.flatnonzero(~judge.valid):
-        verdict = judge.verdict(int(i))
-        raise ValueError(f"the {verdict.label} is not valid: {'; '.join(verdict.reasons())}")
+    for name, row in zip(names_of(len(rows)), rows, strict=True):
+        if not scene.is_valid(row):
+            raise ValueError(f"the {name} is not valid: {'; '.join(map(str, scene.explain(row).reasons))}")
 
 
 def names_of(count: int) -> list[str]:

@@ -156,7 +156,7 @@ class Leg:
 
     def _certified(self, path: Array) -> NDArray[np.bool_]:
         rows = self._space.full(path)
-        return self._scene.edge_is_free(rows[:-1], rows[1:], threads=1)
+        return np.asarray(self._scene.edge_is_free(rows[:-1], rows[1:], threads=1))
 
     def _finished(self, path: Array, goal: Array, resolution: float) -> LegResult:
         if self._shorten:

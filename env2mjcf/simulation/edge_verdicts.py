@@ -1,8 +1,8 @@
-"""Says of each edge of a path or roadmap whether it is valid, and where it first is not."""
+"""Verdicts on the edges of a path or roadmap: whether each is valid, and where it first is not."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import NoReturn
@@ -10,17 +10,14 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.edges import EdgeSteps
+from ..contact.edges import EdgeSteps, even_rows
+from ..contact.types import Verdict
 from ..diagnostics import DiagnosticLog
 from ..kinematics.transforms import Array
-from ..system.locks import lasting
 from .scene import Scene
-from .verdicts import Judge, Verdict
 
 Indices = NDArray[np.int64]
 
-# Configurations that are asked about at once: enough for all cores, few enough to stay in memory.
-_BLOCK = 100_000
 # More checks than this take hours: the step is a slip.
 _MOST_CHECKS = 1e10
 
@@ -66,7 +63,7 @@ class EdgeVerdict:
         start, end: Indices of its nodes.
         valid: Whether nothing is wrong with it.
         checked: Whether it was looked at: not where the file's poses belong to no configuration.
-        proved: Whether it is proved that nothing touches between the checks; None where that was not asked.
+        proved: Whether it is proved that nothing touches between the checks; None without `certified`.
         fraction: Where the first check fails, from 0 at its start to 1 at its end; None where none does.
         at: What is wrong there.
     """
@@ -81,8 +78,8 @@ class EdgeVerdict:
     at: Verdict | None
 
 
-class EdgeJudge:
-    """Judges edges of a scene: limits, boundary and contacts, at even steps.
+class EdgeVerdicts:
+    """Verdicts on edges: limits, boundary and contacts, at even steps.
 
     Args:
         scene: The scene.
@@ -100,7 +97,7 @@ class EdgeJudge:
         valid: (m,) whether nothing is wrong.
         checked: (m,) whether it was looked at.
         stepped: (m,) whether no check failed.
-        proved: (m,) whether it is proved; None where that was not asked.
+        proved: (m,) whether it is proved; None without `certified`.
     """
 
     def __init__(
@@ -131,7 +128,7 @@ class EdgeJudge:
         if certified:
             self.proved = self.valid.copy()
             left = self.valid[owner]
-            free = scene.edge_is_free(starts[left], ends[left], progress=True)
+            free = np.asarray(scene.edge_is_free(starts[left], ends[left], progress=True))
             self.proved[owner[left][~free]] = False
             self.valid &= self.proved
 
@@ -148,23 +145,8 @@ class EdgeJudge:
             bool(self.checked[index]),
             None if self.proved is None else bool(self.proved[index]),
             fraction if failed else None,
-            self._judge.verdict(int(self._rows[index])) if failed else None,
+            self._scene.explain(self._places[index]) if failed else None,
         )
-
-    def rough(self, verdict: EdgeVerdict) -> bool:
-        """Whether a depth is that of a thin plate, not of a body."""
-        return verdict.at is not None and self._judge.rough(verdict.at)
-
-    @lasting
-    def _rows(self) -> Indices:
-        """Row of `_judge` of each edge that fails a check."""
-        return np.cumsum(np.isfinite(self._fractions)) - 1
-
-    @lasting
-    def _judge(self) -> Judge:
-        failed = np.isfinite(self._fractions)
-        labels = [self._edges.labels[i] for i in np.flatnonzero(failed).tolist()]
-        return Judge(self._scene, self._places[failed], labels)
 
     def _refuse(self, start: Array, delta: Array, owner: Indices, given: float | None) -> NoReturn:
         """Raise what is to blame for steps without end: the resolution that was given, the file's, or the edges."""
@@ -183,22 +165,12 @@ class EdgeJudge:
 
     def _walk(self, start: Array, delta: Array, owner: Indices, counts: Indices) -> None:
         """Check all edges at even steps, `counts` of each, and note the first check of each that fails."""
-        stops = np.cumsum(counts)
-        whole = np.bincount(owner, counts, minlength=len(self.valid))
-        passed = np.concatenate([[0], np.cumsum(whole)])
-        for block in _blocks(int(stops[-1]) if len(stops) else 0):
-            open_ = self.valid[owner[np.searchsorted(stops, block, side="right")]]
-            rows = block[open_]
-            piece = np.searchsorted(stops, rows, side="right")
-            at = rows - (stops - counts)[piece]
-            q = start[piece] + (at / (counts[piece] - 1))[:, None] * delta[piece]
-            bad = np.flatnonzero(~self._scene.is_valid(q, progress=True))
-            edges, first = np.unique(owner[piece[bad]], return_index=True)
-            self.valid[edges] = False
-            self._places[edges] = q[bad[first]]
-            self._fractions[edges] = (rows[bad[first]] - passed[edges]) / np.maximum(whole[edges] - 1, 1)
-
-
-def _blocks(total: int) -> Iterator[Indices]:
-    for begin in range(0, total, _BLOCK):
-        yield np.arange(begin, min(begin + _BLOCK, total))
+        failed = self._scene.first_invalid_steps(start, delta, counts, progress=True)
+        bad = np.flatnonzero(failed >= 0)
+        edges, which = np.unique(owner[bad], return_index=True)
+        piece = bad[which]
+        self.valid[edges] = False
+        self._places[edges] = even_rows(start[piece], delta[piece], counts[piece], failed[piece])
+        whole = np.bincount(owner, counts, minlength=len(self.valid))[edges]
+        before = (np.cumsum(counts) - counts)[piece] - (np.cumsum(counts) - counts)[np.searchsorted(owner, edges)]
+        self._fractions[edges] = (before + failed[piece]) / np.maximum(whole - 1, 1)

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from ..contact.exact.engine import require
-from ..contact.types import Contact
+from ..contact.types import Contact, deepest
 from ..diagnostics import DiagnosticLog
 from ..model.environment import Dialect
 from ..options import Options, PathArgument
@@ -41,14 +41,14 @@ def prepare(path: PathArgument, options: Options, log: DiagnosticLog) -> Scene:
     compiled = compile_scene(path, options, log)
     scene = _scene(compiled, log)
     # One look is not worth compiling the exact engine for.
-    touching = _touching_pairs(scene.contacts(scene.space.home, engine="mujoco")) if scene.link_names else {}
+    touching = deepest(scene.contacts(scene.space.home, engine="mujoco")) if scene.link_names else ()
     if touching and options.exclude_rest_contacts:
-        names = ", ".join(f"{a} and {b}" for a, b in touching)
+        names = ", ".join(f"{c.link} and {c.other}" for c in touching)
         log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {names}")
         # The first compilation has reported everything else already.
-        return _scene(recompile(compiled, list(touching), DiagnosticLog()), log)
-    for (link, other), contact in touching.items():
-        _report_touching(compiled, link, other, contact, log)
+        return _scene(recompile(compiled, [(c.link, c.other) for c in touching], DiagnosticLog()), log)
+    for contact in touching:
+        _report_touching(compiled, contact, log)
     return scene.with_diagnostics(tuple(log))
 
 
@@ -57,17 +57,8 @@ def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
     return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
 
 
-def _touching_pairs(contacts: list[Contact]) -> dict[tuple[str, str], Contact]:
-    """Return the deepest contact of each pair."""
-    deepest: dict[tuple[str, str], Contact] = {}
-    for contact in contacts:
-        key = (contact.link, contact.other)
-        if key not in deepest or contact.distance < deepest[key].distance:
-            deepest[key] = contact
-    return deepest
-
-
-def _report_touching(compiled: Compiled, link: str, other: str, contact: Contact, log: DiagnosticLog) -> None:
+def _report_touching(compiled: Compiled, contact: Contact, log: DiagnosticLog) -> None:
+    link, other = contact.link, contact.other
     body = next(p.body for p in compiled.assembly.parts() if p.name == link)
     if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
         # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.

@@ -10,19 +10,19 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, get_args
+from typing import Any, TypedDict, Unpack, get_args, overload
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..contact.edges import check_path
+from ..contact.edges import even_rows
 from ..contact.queries import ContactQueries, joined, packed
 from ..contact.tasks import Question
-from ..contact.threads import ask
-from ..contact.types import Contact, PackedContacts, PathReport
+from ..contact.threads import ask, thread_count
+from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
-from ..kinematics.space import ConfigurationSpace
+from ..kinematics.space import ConfigurationSpace, real_array
 from ..kinematics.transforms import Array
 from ..model.environment import Environment
 from ..options import Engine
@@ -33,6 +33,21 @@ from .mujoco_model import load_spec
 
 _ENGINES = get_args(Engine)
 _FLOAT = np.dtype(np.float64)
+Bools = NDArray[np.bool_]
+
+
+class Work(TypedDict, total=False):
+    """How rows are worked on, see `Scene.in_collision`."""
+
+    threads: int | None
+    executor: Executor | None
+    progress: bool
+
+
+class VerdictWork(Work, total=False):
+    """How rows are worked on, and by which engine, see `Scene.in_collision`."""
+
+    engine: Engine | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +85,7 @@ class Scene:
         self.environment: Environment = compiled.environment
         self.diagnostics: tuple[Diagnostic, ...] = compiled.diagnostics
         self._compiled = compiled
-        self._queries = ContactQueries(compiled, model)
+        self._solver = ContactQueries(compiled, model)
         self._one_row = (compiled.space.dim,)
         self._data: mujoco.MjData | None = None
         self._lock = Lock()
@@ -79,7 +94,7 @@ class Scene:
 
     @property
     def data(self) -> mujoco.MjData:
-        """The scene's simulation state; at home when it is first asked for."""
+        """The scene's simulation state; at home at first."""
         with self._lock:
             if self._data is None:
                 self._data = mujoco.MjData(self.model)
@@ -111,7 +126,7 @@ class Scene:
     @property
     def link_names(self) -> tuple[str, ...]:
         """All robot bodies, in file order."""
-        return tuple(p.name for p in self._queries.links)
+        return tuple(p.name for p in self._solver.links)
 
     @property
     def obstacle_names(self) -> tuple[str, ...]:
@@ -151,7 +166,7 @@ class Scene:
 
     def set(self, q: ArrayLike) -> None:
         """Put the robots of `data` at q, at rest, and run `mj_forward`."""
-        row = self._row(q)
+        row = self.space.check_row(q)
         data = self.data
         data.qpos[:] = self.space.qpos(row)
         data.qvel[:] = 0
@@ -168,10 +183,8 @@ class Scene:
             q: Configurations, (dim,) or (n, dim).
             threads: As for `in_collision`.
         """
-        rows = self.space.check(q)
-        shape = (len(self._queries.links), 4, 4)
-        poses = self._rows(ContactQueries.link_poses, (np.atleast_2d(rows),), threads, None, False, shape=shape)
-        return poses if rows.ndim == 2 else poses[0]
+        columns, shape = (self.space.check(q),), (len(self._solver.links), 4, 4)
+        return self._rows(ContactQueries.link_poses, columns, threads, None, False, kind=np.float64, shape=shape)
 
     def obstacle_poses(self) -> Array:
         """Return the world poses of all obstacles, (m, 4, 4)."""
@@ -184,11 +197,22 @@ class Scene:
         the loop-closing connection would.
         """
         rows = self.space.check(q)
-        errors = self._loop_errors(np.atleast_2d(rows))
-        return errors if rows.ndim == 2 else errors[0].item()
+        worst = np.zeros(len(np.atleast_2d(rows)))
+        for robot, columns in zip(self._compiled.assembly.robots, self.space.robot_slices, strict=True):
+            gaps = robot.kinematics.loop_gaps(np.atleast_2d(rows)[:, columns], [p.radius for p in robot.links])
+            worst = np.maximum(worst, gaps.max(axis=-1, initial=0.0))
+        return worst if rows.ndim == 2 else worst[0].item()
 
     # Verdicts.
 
+    @overload
+    def in_collision(self, q: UnknownShape, **work: Unpack[VerdictWork]) -> bool | Bools: ...
+    @overload
+    def in_collision(self, q: OneRow, **work: Unpack[VerdictWork]) -> bool: ...
+    @overload
+    def in_collision(self, q: Rows, **work: Unpack[VerdictWork]) -> Bools: ...
+    @overload
+    def in_collision(self, q: ArrayLike, **work: Unpack[VerdictWork]) -> bool | Bools: ...
     def in_collision(
         self,
         q: ArrayLike,
@@ -197,7 +221,7 @@ class Scene:
         executor: Executor | None = None,
         progress: bool = False,
         engine: Engine | None = None,
-    ) -> Any:
+    ) -> bool | Bools:
         """Return whether any tested pair touches.
 
         The answers are the same with every number of threads and with every executor.
@@ -216,13 +240,21 @@ class Scene:
 
         Raises:
             ValueError: q has a wrong shape or a value that is not finite, or the engine is unknown or not installed.
-            TypeError: The executor is none.
+            TypeError: The executor is not an Executor.
             concurrent.futures.BrokenExecutor: A worker process died, and the executor does not replace it.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
-            return self._queries.collisions(one).item()
+            return self._solver.collisions(one).item()
         return self._verdicts(ContactQueries.collisions, q, threads, executor, progress, engine)
 
+    @overload
+    def is_valid(self, q: UnknownShape, **work: Unpack[VerdictWork]) -> bool | Bools: ...
+    @overload
+    def is_valid(self, q: OneRow, **work: Unpack[VerdictWork]) -> bool: ...
+    @overload
+    def is_valid(self, q: Rows, **work: Unpack[VerdictWork]) -> Bools: ...
+    @overload
+    def is_valid(self, q: ArrayLike, **work: Unpack[VerdictWork]) -> bool | Bools: ...
     def is_valid(
         self,
         q: ArrayLike,
@@ -231,25 +263,53 @@ class Scene:
         executor: Executor | None = None,
         progress: bool = False,
         engine: Engine | None = None,
-    ) -> Any:
+    ) -> bool | Bools:
         """Return whether q is within limits, every vertex is inside the boundary, and nothing collides.
 
         Arguments, result and errors are those of `in_collision`.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
-            return self._queries.validities(one).item()
+            return self._solver.validities(one).item()
         return self._verdicts(ContactQueries.validities, q, threads, executor, progress, engine)
 
-    def valid_rows(self, rows: Array) -> NDArray[np.bool_]:
+    def valid_rows(self, rows: Array) -> Bools:
         """Return `is_valid` of rows, (n, dim), that are known to be finite float64, in this thread.
 
         Nothing is checked or shared out, which for a few rows takes longer than the verdicts: for planners' loops.
         """
-        return self._queries.validities(rows)
+        return self._solver.validities(rows)
 
+    def explain(self, q: ArrayLike, *, engine: Engine | None = None) -> Verdict:
+        """Return whether one configuration, (dim,), is valid, and all that is wrong with it.
+
+        Args:
+            q: The configuration.
+            engine: Override the scene's engine.
+
+        Returns:
+            The verdict. Its reasons are the deepest `Contact` of each pair that touches, each limit that is broken and
+            each link that reaches beyond the boundary; `str(reason)` says a reason in words.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite, or the engine is unknown or not installed.
+        """
+        return self._solver.explain(self.space.check_row(q), _known(engine))
+
+    def out_of_bounds(self, q: ArrayLike) -> tuple[Reason, ...]:
+        """Return the reasons of `explain` without the contacts, which take longest to find."""
+        return self._solver.out_of_bounds(self.space.check_row(q))
+
+    @overload
+    def clearance(self, q: UnknownShape, **work: Unpack[Work]) -> float | Array: ...
+    @overload
+    def clearance(self, q: OneRow, **work: Unpack[Work]) -> float: ...
+    @overload
+    def clearance(self, q: Rows, **work: Unpack[Work]) -> Array: ...
+    @overload
+    def clearance(self, q: ArrayLike, **work: Unpack[Work]) -> float | Array: ...
     def clearance(
         self, q: ArrayLike, *, threads: int | None = None, executor: Executor | None = None, progress: bool = False
-    ) -> Any:
+    ) -> float | Array:
         """Return the least distance over the tested pairs, in metres; the boundary is not counted.
 
         Free: the distance of the triangles, exact but for rounding; +inf without pairs.
@@ -262,23 +322,10 @@ class Scene:
         with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
         of closed meshes.
 
-        Args:
-            q: Configurations, (dim,) or (n, dim).
-            threads: As for `in_collision`.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Returns:
-            A float, or (n,) floats.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite.
+        q, threads, executor, progress and errors are as for `in_collision`; the answer is a float, or (n,) floats.
         """
-        rows = self.space.check(q)
-        found = self._rows(
-            ContactQueries.clearances, (np.atleast_2d(rows),), threads, executor, progress, kind=np.float64
-        )
-        return found if rows.ndim == 2 else found[0].item()
+        columns = (self.space.check(q),)
+        return self._rows(ContactQueries.clearances, columns, threads, executor, progress, kind=np.float64)
 
     # Contacts.
 
@@ -287,8 +334,11 @@ class Scene:
 
         There are some just where `in_collision` says so. Pairs that cannot move are included. Places, normals and
         depths come from MuJoCo and from triangles, whichever engine says that there are any.
+
+        Raises:
+            ValueError: As for `explain`.
         """
-        return self._queries.contacts(self._row(q), engine)
+        return self._solver.contacts(self.space.check_row(q), _known(engine))
 
     def contacts_of_poses(self, poses: ArrayLike) -> list[Contact]:
         """Return the contacts of links placed by hand, whether or not any configuration puts them there.
@@ -297,12 +347,12 @@ class Scene:
             poses: World poses of all links in the order of `link_names`, (nlinks, 4, 4).
 
         Raises:
-            ValueError: The shape is another.
+            ValueError: poses have a wrong shape or a value that is not finite.
         """
-        placed = np.asarray(poses, dtype=np.float64)
-        if placed.shape != (len(self._queries.links), 4, 4):
-            raise ValueError(f"poses of shape {placed.shape}; expected ({len(self._queries.links)}, 4, 4)")
-        return self._queries.contacts_of_poses(placed)
+        placed = real_array(poses, "poses")
+        if placed.shape != (len(self._solver.links), 4, 4):
+            raise ValueError(f"poses of shape {placed.shape}; expected ({len(self._solver.links)}, 4, 4)")
+        return self._solver.contacts_of_poses(placed)
 
     def packed_contacts(
         self,
@@ -315,17 +365,8 @@ class Scene:
     ) -> PackedContacts:
         """Return the contacts of many configurations as arrays: those of `contacts`, row by row, in its order.
 
-        Contacts are found by Python code, one row at a time: processes make them quicker, threads hardly do.
-
-        Args:
-            q: Configurations, (n, dim).
-            threads: As for `in_collision`.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-            engine: Override the scene's engine.
-
-        Raises:
-            ValueError: q has a wrong shape or a value that is not finite.
+        Contacts are found by Python code, one row at a time: processes make them quicker, threads hardly do. q is
+        (n, dim); the other arguments and errors are as for `in_collision`.
         """
         rows = self.space.check(q)
         if rows.ndim != 2:
@@ -335,12 +376,28 @@ class Scene:
         def store(where: slice, answers: PackedContacts) -> None:
             parts[where.start] = answers
 
-        question = Question(packed, (rows,), (engine,), self._queries.row_bytes())
-        ask(self._queries, question, store, threads, executor, progress)
-        return joined([parts[start] for start in sorted(parts)])
+        question = Question(packed, (rows,), (_known(engine),), self._solver.row_bytes())
+        ask(self._solver, question, store, threads, executor, progress)
+        return joined([parts[start] for start in sorted(parts)] or [packed(self._solver, rows)])
 
     # Edges and paths.
 
+    @overload
+    def edge_in_collision(
+        self, q0: UnknownShape, q1: UnknownShape, resolution: float | None = None, **work: Unpack[VerdictWork]
+    ) -> bool | Bools: ...
+    @overload
+    def edge_in_collision(
+        self, q0: OneRow, q1: OneRow, resolution: float | None = None, **work: Unpack[VerdictWork]
+    ) -> bool: ...
+    @overload
+    def edge_in_collision(
+        self, q0: Rows, q1: Rows, resolution: float | None = None, **work: Unpack[VerdictWork]
+    ) -> Bools: ...
+    @overload
+    def edge_in_collision(
+        self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None, **work: Unpack[VerdictWork]
+    ) -> bool | Bools: ...
     def edge_in_collision(
         self,
         q0: ArrayLike,
@@ -350,7 +407,8 @@ class Scene:
         threads: int | None = None,
         executor: Executor | None = None,
         progress: bool = False,
-    ) -> Any:
+        engine: Engine | None = None,
+    ) -> bool | Bools:
         """Return whether anything touches on the straight way between two configurations, ends included.
 
         Args:
@@ -361,16 +419,23 @@ class Scene:
             threads: As for `in_collision`; edges count as rows.
             executor: As for `in_collision`.
             progress: Show a progress bar on a terminal.
+            engine: Override the scene's engine.
 
         Raises:
-            ValueError: q0 and q1 differ in shape, or the resolution is not positive, or too small for such edges.
+            ValueError: q0 and q1 differ in shape, the engine is unknown or not installed, or the resolution is not
+                positive, or too small for such edges.
         """
-        start, delta = self._way(q0, q1)
-        extras = (self._queries.steps.resolution(resolution),)
-        columns = np.atleast_2d(start), np.atleast_2d(delta)
-        hits = self._rows(ContactQueries.edges_collide, columns, threads, executor, progress, extras)
-        return hits if start.ndim == 2 else hits[0].item()
+        extras = self._solver.steps.resolution(resolution), _known(engine)
+        return self._rows(ContactQueries.edges_collide, self._way(q0, q1), threads, executor, progress, extras)
 
+    @overload
+    def edge_is_free(self, q0: UnknownShape, q1: UnknownShape, **work: Unpack[Work]) -> bool | Bools: ...
+    @overload
+    def edge_is_free(self, q0: OneRow, q1: OneRow, **work: Unpack[Work]) -> bool: ...
+    @overload
+    def edge_is_free(self, q0: Rows, q1: Rows, **work: Unpack[Work]) -> Bools: ...
+    @overload
+    def edge_is_free(self, q0: ArrayLike, q1: ArrayLike, **work: Unpack[Work]) -> bool | Bools: ...
     def edge_is_free(
         self,
         q0: ArrayLike,
@@ -379,56 +444,74 @@ class Scene:
         threads: int | None = None,
         executor: Executor | None = None,
         progress: bool = False,
-    ) -> Any:
+    ) -> bool | Bools:
         """Return whether nothing touches anywhere on the straight way between two configurations, proved.
 
         True is a proof: distances along the way are compared with how far bodies can move (bounded as for
         `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
-        than 1e-5 of the extent. Joint values in between are not rounded to any step.
-
-        Args:
-            q0: Where the edges begin, (dim,) or (n, dim).
-            q1: Where they end, of the same shape.
-            threads: As for `in_collision`; edges count as rows.
-            executor: As for `in_collision`.
-            progress: Show a progress bar on a terminal.
-
-        Raises:
-            ValueError: q0 and q1 differ in shape.
+        than 1e-5 of the extent. Joint values in between are not rounded to any step. Arguments, result and errors are
+        as for `edge_in_collision`.
         """
-        start, delta = self._way(q0, q1)
-        columns = np.atleast_2d(start), np.atleast_2d(delta)
-        free = self._rows(ContactQueries.edges_are_free, columns, threads, executor, progress)
-        return free if start.ndim == 2 else free[0].item()
+        return self._rows(ContactQueries.edges_are_free, self._way(q0, q1), threads, executor, progress)
 
-    def check_path(self, path: ArrayLike, resolution: float | None = None) -> PathReport:
-        """Check the validity of a path's configurations and of the straight edges between them.
+    def check_path(
+        self,
+        path: ArrayLike,
+        resolution: float | None = None,
+        *,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        progress: bool = False,
+        engine: Engine | None = None,
+    ) -> PathReport:
+        """Check the validity of a path's configurations, (k, dim), and of the straight edges between them.
 
-        Args:
-            path: (k, dim).
-            resolution: As for `edge_in_collision`.
-
-        Raises:
-            ValueError: The path has a wrong shape, or the resolution is not positive, or too small for such edges.
+        The other arguments, and errors, are as for `edge_in_collision`.
         """
-        queries = self._queries
-        return check_path(path, queries.steps, queries.validities, queries.contacts, self.space, resolution)
+        rows = self.space.check(path)
+        if rows.ndim != 2:
+            raise ValueError(f"a path of shape {rows.shape}; expected (k, {self.space.dim})")
+        work: VerdictWork = {"threads": threads, "executor": executor, "progress": progress, "engine": engine}
+        good = np.asarray(self.is_valid(rows, **work))
+        start, delta = rows[:-1], self.space.difference(rows[:-1], rows[1:])
+        counts = self._solver.steps.bounded_counts(start, delta, resolution)
+        failed = self.first_invalid_steps(start, delta, counts, **work)
+        bad = np.flatnonzero(~good | np.append(failed >= 0, False)[: len(rows)])
+        if not len(bad):
+            return PathReport(True, good, failed < 0, None, None, ())
+        i = int(bad[0])
+        edge = slice(i, i + 1)
+        q = even_rows(start[edge], delta[edge], counts[edge], failed[edge])[0] if good[i] else rows[i]
+        return PathReport(False, good, failed < 0, i, q, tuple(self._solver.contacts(q, engine)))
 
-    def step(self, resolution: float | None = None) -> float:
+    def first_invalid_steps(
+        self, start: Array, delta: Array, counts: NDArray[np.int64], **work: Unpack[VerdictWork]
+    ) -> NDArray[np.int64]:
+        """Return which of `counts` even steps of ways from (e, dim) by (e, dim) is not valid first, (e,), or -1.
+
+        **work is as for `in_collision`.
+        """
+        threads, executor, progress = work.get("threads"), work.get("executor"), work.get("progress", False)
+        if executor is None:
+            threads = thread_count(threads, int(counts.sum()))
+        columns, extras = (start, delta, counts), (_known(work.get("engine")),)
+        return self._rows(ContactQueries.first_invalid, columns, threads, executor, progress, extras, kind=np.int64)
+
+    def resolution(self, resolution: float | None = None) -> float:
         """Return the step in metres that a resolution means: itself, else the file's PositionRes, else 0.01 extent.
 
         Raises:
             ValueError: The resolution is not positive.
         """
-        return self._queries.steps.resolution(resolution)
+        return self._solver.steps.resolution(resolution)
 
     def edge_rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None) -> Array:
         """Return the configurations that `edge_in_collision` looks at on one edge, both ends included, (n, dim).
 
         Raises:
-            ValueError: q0 or q1 is no configuration, or the resolution is not positive, or too small for such an edge.
+            ValueError: q0 or q1 is not a configuration, or the resolution is not positive, or too small for the edge.
         """
-        return self._queries.steps.rows(q0, q1, resolution)
+        return self._solver.steps.rows(q0, q1, resolution)
 
     def warm_up(self, *, wait: bool = True) -> float:
         """Make ready what the first query would have to wait for; return the seconds that it took.
@@ -439,62 +522,63 @@ class Scene:
             wait: False works in a thread of its own, and returns 0.0 at once.
         """
         if not wait:
-            threading.Thread(target=self._queries.warm_up, name="env2mjcf-warm-up", daemon=True).start()
+            threading.Thread(target=self._solver.warm_up, name="env2mjcf-warm-up", daemon=True).start()
             return 0.0
         start = time.perf_counter()
-        self._queries.warm_up()
+        self._solver.warm_up()
         return time.perf_counter() - start
 
-    # Pickling: the model and the compiled scene travel, the rest is built again.
+    # Copies and pickles: the compiled scene, the model and the state of `data` travel, the rest is built again.
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"compiled": self._compiled, "model": self.model}
+        # Data holds its model, and a copy of data holds a copy of it.
+        return {"compiled": self._compiled, "simulation": self.model if self._data is None else self._data}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["compiled"], state["model"])
+        held: mujoco.MjModel | mujoco.MjData = state["simulation"]
+        self.__init__(state["compiled"], held.model if isinstance(held, mujoco.MjData) else held)
+        self._data = held if isinstance(held, mujoco.MjData) else None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
-        return Scene(self._compiled, copy.copy(self.model))
+        state = self.__getstate__()
+        twin = Scene.__new__(Scene)
+        twin.__setstate__({**state, "simulation": copy.deepcopy(state["simulation"])})
+        return twin
 
     def __repr__(self) -> str:
         robots = len(self._compiled.assembly.robots)
         return (
             f"<Scene {self.environment.name!r}: {robots} robot{'' if robots == 1 else 's'}, "
-            f"{len(self._queries.links)} links, {self.space.dim} degrees of freedom, "
+            f"{len(self._solver.links)} links, {self.space.dim} degrees of freedom, "
             f"{len(self.obstacle_names)} obstacles>"
         )
 
-    # How rows are answered.
+    # How rows are worked on.
 
     def _rows(
         self,
         function: Callable[..., Any],
-        columns: tuple[Array, ...],
+        columns: tuple[NDArray[Any], ...],
         threads: int | None,
         executor: Executor | None,
         progress: bool,
         extras: tuple[Any, ...] = (),
         *,
         kind: type[np.generic] = np.bool_,
-        shape: tuple[int, ...] | None = None,
+        shape: tuple[int, ...] = (),
         row_bytes: int | None = None,
-    ) -> NDArray[Any]:
-        """Return one answer for each row, each a `kind`, or an array of floats of this shape."""
-        count = len(columns[0])
-        answers = np.empty((count, *shape) if shape else count, dtype=np.float64 if shape else kind)
+    ) -> Any:
+        """Return an answer for each row, each an array of this kind and shape; for a single row the answer itself."""
+        one = columns[0].ndim == 1
+        given = tuple(c[None] for c in columns) if one else columns
+        answers = np.empty((len(given[0]), *shape), dtype=kind)
 
         def store(where: slice, some: NDArray[Any]) -> None:
             answers[where] = some
 
-        question = Question(function, columns, extras, row_bytes or self._queries.row_bytes())
-        ask(self._queries, question, store, threads, executor, progress)
-        return answers
-
-    def _row(self, q: ArrayLike) -> Array:
-        row = self.space.check(q)
-        if row.ndim != 1:
-            raise ValueError(f"configurations of shape {row.shape}; expected one of shape ({self.space.dim},)")
-        return row
+        question = Question(function, given, extras, row_bytes or self._solver.row_bytes())
+        ask(self._solver, question, store, threads, executor, progress)
+        return answers if not one else answers[0] if shape else answers[0].item()
 
     def _at_once(self, q: ArrayLike) -> Array | None:
         """Return a single good row as (1, dim); None for anything else, which takes the long way.
@@ -514,15 +598,10 @@ class Scene:
         executor: Executor | None,
         progress: bool,
         engine: Engine | None,
-    ) -> Any:
-        if engine is not None and engine not in _ENGINES:
-            raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, _ENGINES))}")
-        rows = self.space.check(q)
-        row_bytes = self._queries.row_bytes(engine, verdicts=True)
-        found = self._rows(
-            function, (np.atleast_2d(rows),), threads, executor, progress, (engine,), row_bytes=row_bytes
-        )
-        return found if rows.ndim == 2 else found[0].item()
+    ) -> bool | Bools:
+        rows, engine = self.space.check(q), _known(engine)
+        row_bytes = self._solver.row_bytes(engine, verdicts=True)
+        return self._rows(function, (rows,), threads, executor, progress, (engine,), row_bytes=row_bytes)
 
     def _way(self, q0: ArrayLike, q1: ArrayLike) -> tuple[Array, Array]:
         """Return where ways begin, and where they lead from there."""
@@ -531,9 +610,9 @@ class Scene:
             raise ValueError(f"q0 has shape {start.shape} and q1 {end.shape}; expected equal shapes")
         return start, self.space.difference(start, end)
 
-    def _loop_errors(self, rows: Array) -> Array:
-        worst = np.zeros(len(rows))
-        for robot, columns in zip(self._compiled.assembly.robots, self.space.robot_slices, strict=True):
-            gaps = robot.kinematics.loop_gaps(rows[:, columns], [p.radius for p in robot.links])
-            worst = np.maximum(worst, gaps.max(axis=-1, initial=0.0))
-        return worst
+
+def _known(engine: Engine | None) -> Engine | None:
+    """Return an engine, or raise a ValueError if it does not exist."""
+    if engine is not None and engine not in _ENGINES:
+        raise ValueError(f"engine={engine!r} is not one of {', '.join(map(repr, _ENGINES))}")
+    return engine

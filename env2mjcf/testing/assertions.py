@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..contact.types import Reason
 from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
-from ..simulation.verdicts import Judge, touch
+from ..simulation.verdicts import any_rough
 from ..view.offscreen import RenderError
 from ..view.pictures import picture as draw
 
@@ -24,6 +25,8 @@ PICTURES_VARIABLE = "ENV2MJCF_PICTURES"
 """Environment variable that names a folder for pictures of failures; pytest's --env2mjcf-pictures sets it."""
 
 _ROUGH = "(depths at bodies that are not convex are rough: such meshes collide as thin plates)"
+# What is said where a verdict has no reasons.
+_UNSEEN = "something touches, within the tolerance of contact"
 # Reasons beyond these are counted, not listed.
 _LISTED = 12
 # As many configurations of a path are drawn as ghosts.
@@ -47,15 +50,7 @@ def assert_free(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | No
     """
     __tracebackhide__ = True
     rows = _rows(scene, q)
-    bad = np.flatnonzero(scene.in_collision(rows))
-    if not len(bad):
-        return
-    row = rows[bad[0]]
-    judge = Judge(scene, row[None], [""])
-    verdict = judge.verdict(0)
-    reasons = [touch(c) for c in verdict.contacts] or ["something touches, within the tolerance of contact"]
-    head = _head(scene, row, bad, len(rows), "in collision")
-    raise AssertionError(_message(head, reasons, judge.rough(verdict), _draw(scene, row[None], picture)))
+    _refuse(scene, rows, np.asarray(scene.in_collision(rows)), "in collision", picture)
 
 
 def assert_valid(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | None = None) -> None:
@@ -65,12 +60,7 @@ def assert_valid(scene: Scene, q: ArrayLike, *, picture: str | PathLike[str] | N
     """
     __tracebackhide__ = True
     rows = _rows(scene, q)
-    bad = np.flatnonzero(~scene.is_valid(rows))
-    if not len(bad):
-        return
-    row = rows[bad[0]]
-    head = _head(scene, row, bad, len(rows), "not valid")
-    raise AssertionError(_message(head, *_reasons(scene, row), _draw(scene, row[None], picture)))
+    _refuse(scene, rows, ~np.asarray(scene.is_valid(rows)), "not valid", picture)
 
 
 def assert_valid_path(
@@ -106,7 +96,7 @@ def assert_valid_path(
     )
     ghosts = rows[np.linspace(0, len(rows) - 1, min(len(rows), _GHOSTS)).round().astype(int)]
     drawn = _draw(scene, np.vstack([ghosts, report.invalid_q]), picture)
-    raise AssertionError(_message(head, *_reasons(scene, report.invalid_q), drawn))
+    raise AssertionError(_message(scene, head, scene.explain(report.invalid_q).reasons, drawn))
 
 
 def _rows(scene: Scene, q: ArrayLike) -> Array:
@@ -116,16 +106,20 @@ def _rows(scene: Scene, q: ArrayLike) -> Array:
     return rows
 
 
-def _reasons(scene: Scene, row: Array) -> tuple[Sequence[str], bool]:
-    judge = Judge(scene, row[None], [""])
-    verdict = judge.verdict(0)
-    return verdict.reasons() or ("something touches, within the tolerance of contact",), judge.rough(verdict)
-
-
-def _head(scene: Scene, row: Array, bad: NDArray[np.intp], total: int, what: str) -> str:
-    if total == 1:
-        return f"the configuration is {what}\n  {_values(scene, row)}"
-    return f"{len(bad)} of {total} configurations are {what}; the first is row {bad[0]}\n  {_values(scene, row)}"
+def _refuse(
+    scene: Scene, rows: Array, wrong: NDArray[np.bool_], what: str, picture: str | PathLike[str] | None
+) -> None:
+    """Raise an AssertionError about the first row that is wrong, if any is."""
+    __tracebackhide__ = True
+    if not wrong.any():
+        return
+    first = int(np.argmax(wrong))
+    several = f"{wrong.sum()} of {len(rows)} configurations are {what}; the first is row {first}"
+    head = f"the configuration is {what}" if len(rows) == 1 else several
+    verdict = scene.explain(rows[first])
+    drawn = _draw(scene, rows[first : first + 1], picture)
+    reasons = verdict.contacts if what == "in collision" else verdict.reasons
+    raise AssertionError(_message(scene, f"{head}\n  {_values(scene, rows[first])}", reasons, drawn))
 
 
 def _values(scene: Scene, row: Array) -> str:
@@ -140,11 +134,11 @@ def _place(scene: Scene, path: Array, index: int, q: Array) -> str:
     return f"between its configurations {index} and {index + 1} of {len(path)}, {part / whole:.0%} of the way"
 
 
-def _message(head: str, reasons: Sequence[str], rough: bool, drawn: str) -> str:
-    lines = [head, *(f"    {reason}" for reason in reasons[:_LISTED])]
+def _message(scene: Scene, head: str, reasons: Sequence[Reason], drawn: str) -> str:
+    lines = [head, *(f"    {reason}" for reason in reasons[:_LISTED] or (_UNSEEN,))]
     if len(reasons) > _LISTED:
         lines.append(f"    ... and {len(reasons) - _LISTED} more")
-    if rough:
+    if any_rough(scene, reasons):
         lines.append(f"    {_ROUGH}")
     if drawn:
         lines.append(f"    {drawn}")
@@ -152,7 +146,7 @@ def _message(head: str, reasons: Sequence[str], rough: bool, drawn: str) -> str:
 
 
 def _draw(scene: Scene, rows: Array, picture: str | PathLike[str] | None) -> str:
-    """Draw a failure, the last row in full, and say where it lies; a picture that fails is said, and is no failure."""
+    """Draw a failure, the last row in full, and return where it lies, or why there is no picture."""
     target = Path(picture) if picture is not None else _default_picture()
     if target is None:
         return ""

@@ -107,9 +107,7 @@ def film(
         )
     count = max(2, round(length * fps))
     q, _ = paced(scene, path, count)
-    touching = tuple(
-        tuple(scene.contacts(row)) if hit else () for row, hit in zip(q, scene.in_collision(q), strict=True)
-    )
+    touching = tuple(tuple(scene.contacts(row)) for row in q)
     ways = reference_points(scene, q) if ghosts else np.zeros((0, count, 3))
     frames = [_frame(row, ways[:, _thinned(i + 1)], touching[i]) for i, row in enumerate(q)]
     marks = tuple(_ahead(mark) for mark in trail_marks(scene, path)) if ghosts else ()

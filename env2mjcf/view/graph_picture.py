@@ -10,16 +10,16 @@ from ..companions.records import Configurations
 
 if TYPE_CHECKING:
     from ..kinematics.transforms import Array
-    from ..simulation.edge_verdicts import EdgeJudge
+    from ..simulation.edge_verdicts import EdgeVerdicts
     from ..simulation.scene import Scene
-    from ..simulation.verdicts import Judge
+    from ..simulation.verdicts import Verdicts
     from .marks import Color, Mark
 
 # A line is cut so finely that a turning robot's way looks round.
 _PARTS = 8
 
 
-def draw(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | None, file: str) -> None:
+def draw(scene: Scene, rows: Configurations, nodes: Verdicts, edges: EdgeVerdicts | None, file: str) -> None:
     """Draw the nodes as dots and the edges as lines, green where they are valid and red where they are not.
 
     Both go through one point of the robot that moves. The robot stands, and what it touches is shown, where the first
@@ -30,20 +30,20 @@ def draw(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | No
     """
     from .pictures import picture
 
-    q, wrong = _place(scene, rows, judge, edges)
-    picture(scene, q, file=file, contacts=wrong, marks=_marks(scene, rows, judge, edges))
+    q, wrong = _place(scene, rows, nodes, edges)
+    picture(scene, q, file=file, contacts=wrong, marks=_marks(scene, rows, nodes, edges))
 
 
-def _place(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | None) -> tuple[Array, bool]:
-    if not judge.valid.all():
-        return rows.q[int(np.argmin(judge.valid))], True
+def _place(scene: Scene, rows: Configurations, nodes: Verdicts, edges: EdgeVerdicts | None) -> tuple[Array, bool]:
+    if not nodes.valid.all():
+        return rows.q[int(np.argmin(nodes.valid))], True
     if edges is not None and not edges.valid.all():
         verdict = edges.verdict(int(np.argmin(edges.valid)))
         return (rows.q[verdict.start] if verdict.at is None else verdict.at.q), True
     return rows.q[0], False
 
 
-def _marks(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | None) -> list[Mark]:
+def _marks(scene: Scene, rows: Configurations, nodes: Verdicts, edges: EdgeVerdicts | None) -> list[Mark]:
     from .marks import BAD, GOOD, Points, Polyline
 
     def color(valid: bool) -> Color:
@@ -57,8 +57,8 @@ def _marks(scene: Scene, rows: Configurations, judge: Judge, edges: EdgeJudge | 
             # What is invalid is drawn last, over the rest.
             for i in np.argsort(~edges.valid[owner], kind="stable").tolist():
                 marks.append(Polyline(lines[i], color(bool(edges.valid[owner[i]]))))
-        nodes = _points(scene, rows.q, robot)
-        marks += [Points(nodes[judge.valid == so], color(so)) for so in (True, False) if (judge.valid == so).any()]
+        places = _points(scene, rows.q, robot)
+        marks += [Points(places[nodes.valid == so], color(so)) for so in (True, False) if (nodes.valid == so).any()]
     return marks
 
 

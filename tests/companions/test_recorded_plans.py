@@ -11,7 +11,7 @@ import env2mjcf
 from env2mjcf import Roadmap, Scene
 from env2mjcf.companions.local_planners import ways_between
 from env2mjcf.diagnostics import DiagnosticLog
-from env2mjcf.simulation.edge_verdicts import EdgeJudge, Edges
+from env2mjcf.simulation.edge_verdicts import Edges, EdgeVerdicts
 
 FOLDERS = {"2loop_13con": "old-2loop.2loop_13con", "branchs": "old-testBranchs.branchs",
            "serial": "old-testSerialInWall.serial"}  # fmt: skip
@@ -84,7 +84,7 @@ def test_a_roadmap_has_as_many_nodes_and_edges_as_it_declares(scenes: dict[str, 
 
 def test_the_recorded_path_of_serial_is_free_and_proved_free(scenes: dict[str, Scene]) -> None:
     scene = scenes["serial"]
-    judge = EdgeJudge(scene, steps(scene, "serial.path"), certified=True)
+    judge = EdgeVerdicts(scene, steps(scene, "serial.path"), certified=True)
     assert (len(judge.valid), judge.valid.all()) == (512, True)
 
 
@@ -95,10 +95,10 @@ def test_the_recorded_path_of_branchs_grazes_the_block_once(scenes: dict[str, Sc
     """
     scene = scenes["branchs"]
     edges = steps(scene, "branchs.path")
-    assert EdgeJudge(scene, edges).valid.all()
-    found = EdgeJudge(scene, edges, certified=True)
+    assert EdgeVerdicts(scene, edges).valid.all()
+    found = EdgeVerdicts(scene, edges, certified=True)
     assert np.flatnonzero(~found.valid).tolist() == [166]
-    fine = EdgeJudge(scene, Edges(edges.q, edges.ends[166:167], (), ["166"]), resolution=0.01).verdict(0)
+    fine = EdgeVerdicts(scene, Edges(edges.q, edges.ends[166:167], (), ["166"]), resolution=0.01).verdict(0)
     assert fine.at is not None
     assert [(c.link, c.other) for c in fine.at.contacts] == [("link1", "block")]
     assert -0.01 < fine.at.contacts[0].distance < 0
@@ -108,8 +108,8 @@ def test_the_roadmap_of_serial_is_free_the_way_that_its_local_planners_went(scen
     """76 edges are straight; 2 turn half way, and collide if they are taken as straight."""
     found, edges = roadmap(scenes["serial"], "serial")
     assert np.bincount(found.planners).tolist() == [0, 76, 2]
-    assert EdgeJudge(scenes["serial"], edges, resolution=0.02).valid.all()
-    straight = EdgeJudge(scenes["serial"], Edges(found.q, found.edges, (), edges.labels), resolution=0.02)
+    assert EdgeVerdicts(scenes["serial"], edges, resolution=0.02).valid.all()
+    straight = EdgeVerdicts(scenes["serial"], Edges(found.q, found.edges, (), edges.labels), resolution=0.02)
     assert straight.valid.tolist() == (found.planners == 1).tolist()
 
 
@@ -122,9 +122,9 @@ def test_the_roadmap_of_branchs_is_free_but_for_grazes(scenes: dict[str, Scene])
     scene = scenes["branchs"]
     found, edges = roadmap(scene, "branchs")
     assert np.bincount(found.planners).tolist() == [0, 198, 10]
-    straight = EdgeJudge(scene, Edges(found.q, found.edges, (), edges.labels))
+    straight = EdgeVerdicts(scene, Edges(found.q, found.edges, (), edges.labels))
     assert not straight.valid[found.planners == 2].any()
-    judge = EdgeJudge(scene, edges)
+    judge = EdgeVerdicts(scene, edges)
     assert np.bincount(found.planners[judge.valid]).tolist() == [0, 194, 8]
     for i in np.flatnonzero(~judge.valid):
         at = judge.verdict(int(i)).at

@@ -122,7 +122,7 @@ def test_a_scene_travels_without_its_files(cubes: env2mjcf.Scene) -> None:
     again = pickle.loads(text)
     q = near(cubes, 500)
     np.testing.assert_array_equal(again.in_collision(q), cubes.in_collision(q))
-    parcel = remote.parcel(again._queries)
+    parcel = remote.parcel(again._solver)
     assert len(parcel.content) < len(text) / 5
 
 

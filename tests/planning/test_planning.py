@@ -346,7 +346,7 @@ def test_robots_that_do_not_move_are_judged_where_they_stay(tmp_path: Path):
     ("arguments", "message"),
     [
         ({"goal": [0.3, 0, 0]}, r"the goal is not valid: cube and cube_2 \(obstacle\)"),
-        ({"start": [-3.9, 0, 0]}, r"the start is not valid: outside: cube"),
+        ({"start": [-3.9, 0, 0]}, r"the start is not valid: cube reaches .* outside the boundary"),
         ({"planner": "RRTConect"}, r"did you mean 'RRTConnect'\? \(planners: auto, RRTConnect, .*BFMT, BatchEST\)"),
         ({"robot": 1}, "there is no robot 1; the scene has 1"),
         ({"time": 0}, "time is 0"),

@@ -10,7 +10,7 @@ from scenes import box_mesh, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.cli.main import main
-from env2mjcf.simulation.pair_counts import count_touching
+from env2mjcf.simulation.verdicts import count_touching
 
 # A fixed foot in a block that it stands in, and a hand on a hinge about z, two away from the axis.
 ARM = (

@@ -292,7 +292,7 @@ class TestForks:
         q = rows(scene)
         expected = scene.clearance(q[:4]).tolist()
         fresh = env2mjcf.load(ALPHA)
-        with elsewhere(fresh._queries._lock), elsewhere(fresh._lock):
+        with elsewhere(fresh._solver._lock), elsewhere(fresh._lock):
             said = said_in_child(lambda: (fresh.clearance(q[:4]).tolist() == expected, fresh.data.time))
         assert said == "(True, 0.0)"
 

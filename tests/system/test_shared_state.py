@@ -131,7 +131,7 @@ def test_nothing_of_a_scene_is_left_when_it_is_gone() -> None:
     for _ in range(3):
         scene = env2mjcf.load(ALPHA)
         scene.clearance(scene.space.home)
-        remote.parcel(scene._queries)
+        remote.parcel(scene._solver)
     del scene
     assert holdings() == before
 

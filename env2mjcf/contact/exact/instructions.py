@@ -14,7 +14,7 @@ from ...kinematics.space import ConfigurationSpace
 from ...kinematics.transforms import inverse, transform
 from ...model.environment import Boundary
 from ...pairs import Pair
-from ..boundary import ROUNDING
+from ..containment import ROUNDING
 from ..surfaces import Surface, Surfaces
 from .motions import Motions
 from .tables import BoundaryKind, Table, packed

@@ -1,19 +1,18 @@
 """The panel of the page: status, buttons, sliders, and the controls of a path.
 
-MERGED: What the page says, as HTML in which names of files are text and nothing else.
+Its texts are HTML, in which names out of files are text and nothing else.
 """
 
 from __future__ import annotations
 
 import html
 import unicodedata
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from ...contact.types import Contact
+from ...contact.types import Verdict
+from ...kinematics.space import ConfigurationSpace
 from ...kinematics.transforms import Array
 from ...simulation.scene import Query, Scene
-from ...simulation.verdicts import Judgement
 from .playback import Track
 from .sliders import Dial, Dials
 
@@ -98,14 +97,14 @@ class Page:
 
     # What is shown.
 
-    def report(self, judgement: Judgement, q: Array) -> None:
-        """Say what is known of the configuration that is shown."""
-        self._status.content = status(judgement)
+    def report(self, verdict: Verdict, looking: bool = False) -> None:
+        """Say what is wrong with the configuration that is shown; `looking` for contacts, which are not told yet."""
+        self._status.content = status(verdict, looking)
         # A list that is only a moment old is better than one that flickers while a slider is dragged.
-        if judgement.contacts is not None or not self._listed:
-            self._reasons.content = reasons(judgement, self._scene, q)
-        if judgement.contacts is not None:
-            self._listed = bool(judgement.contacts)
+        if not looking or not self._listed:
+            self._reasons.content = reasons(verdict, self._scene.space, looking)
+        if not looking:
+            self._listed = bool(verdict.contacts)
 
     def notify(self, message: str) -> None:
         """Tell everybody something for a moment."""
@@ -179,10 +178,9 @@ class Page:
         several = len(self._scene.space.robot_slices) > 1
         with gui.add_folder(f"Robot{f' {number}' if several else ''}{_units(dials)}"):
             for dial in dials:
-                slider = gui.add_slider(
-                    dial.label, dial.low, dial.high, dial.step, dial.low, disabled=dial.low == dial.high,
-                    hint=f"{dial.name}: {'a length as in the file' if dial.length else dial.unit}; {dial.limits}.",
-                )  # fmt: skip
+                hint = f"{dial.name}: {'a length as in the file' if dial.length else dial.unit}; {dial.limits}."
+                ends = dial.low, dial.high, dial.step, dial.low
+                slider = gui.add_slider(dial.label, *ends, disabled=dial.low == dial.high, hint=hint)
                 slider.on_update(self._turned)
                 self._sliders.append(slider)
 
@@ -228,60 +226,31 @@ def as_label(name: str) -> str:
     )
 
 
-def status(judgement: Judgement) -> str:
+def status(verdict: Verdict, looking: bool = False) -> str:
     """Return the line that says what is wrong with the configuration, if anything."""
-    wrong = [
-        what
-        for what, so in (
-            ("in collision", judgement.collides),
-            ("out of limits", judgement.beyond),
-            ("outside the boundary", judgement.outside),
-        )
-        if so
-    ]
-    words, colour = (", ".join(wrong), _BAD) if wrong else ("valid", _GOOD)
+    wrong = ", ".join(filter(None, ("in collision" if looking else "", verdict.summary)))
+    words, colour = (wrong, _BAD) if wrong else ("valid", _GOOD)
     return (
         f'<div id="status" style="margin:0.5em 0.8em;padding:0.35em 0.7em;border-radius:0.4em;color:#fff;'
         f'font-weight:600;background:{colour}">{words}</div>'
     )
 
 
-def reasons(judgement: Judgement, scene: Scene, q: Array) -> str:
+def reasons(verdict: Verdict, space: ConfigurationSpace, looking: bool = False) -> str:
     """Return the list of what touches and how deep, of limits that are broken, and of links outside the boundary."""
-    items = [*_touches(judgement.contacts), *_limits(judgement, scene, q)]
-    items += [f"<b>{as_text(name)}</b> reaches outside the boundary" for name in judgement.outside]
-    rows = "".join(f"<div>{item}</div>" for item in items[:_LISTED])
-    more = f'<div style="color:{_DIM}">... and {len(items) - _LISTED} more</div>' if len(items) > _LISTED else ""
-    nothing = f'<span style="color:{_DIM}">nothing touches</span>' if judgement.contacts == () and not items else ""
-    return f'<div id="reasons" style="{_BOX}">{rows}{more}{nothing}</div>'
+    items = [_dim("looking for contacts ...")] if looking else []
+    for c in verdict.contacts:
+        items.append(f"<b>{as_text(c.link)}</b> and <b>{as_text(c.other)}</b> {_dim(f'({c.kind})')} {c.depth}")
+    numbers, lower, upper = (space.in_file_units(v) for v in (verdict.q, space.lower, space.upper))
+    for i in map(space.names.index, (limit.name for limit in verdict.limits)):
+        text = f"is {numbers[i]:.6g}; limits {lower[i]:.6g} to {upper[i]:.6g}"
+        items.append(f"<b>{as_text(space.names[i])}</b> {text}")
+    items += [f"<b>{as_text(name)}</b> reaches outside the boundary" for name in verdict.outside]
+    if len(items) > _LISTED:
+        items[_LISTED:] = [_dim(f"... and {len(items) - _LISTED} more")]
+    rows = "".join(f"<div>{item}</div>" for item in items or [_dim("nothing touches")])
+    return f'<div id="reasons" style="{_BOX}">{rows}</div>'
 
 
-def _touches(contacts: Sequence[Contact] | None) -> list[str]:
-    if contacts is None:
-        return [f'<span style="color:{_DIM}">looking for contacts ...</span>']
-    return [
-        f"<b>{as_text(c.link)}</b> and <b>{as_text(c.other)}</b> "
-        f'<span style="color:{_DIM}">({c.kind})</span> {_depth(c.distance)}'
-        for c in _deepest(contacts)
-    ]
-
-
-def _deepest(contacts: Sequence[Contact]) -> list[Contact]:
-    """Return one contact of each pair: the first, for the deepest come first."""
-    found: dict[tuple[str, str], Contact] = {}
-    for contact in contacts:
-        found.setdefault((contact.link, contact.other), contact)
-    return list(found.values())
-
-
-def _depth(distance: float) -> str:
-    return f"{-distance:.3g} m deep" if distance < 0 else "touching"
-
-
-def _limits(judgement: Judgement, scene: Scene, q: Array) -> list[str]:
-    space = scene.space
-    numbers, lower, upper = (space.encode(v) for v in (q, space.lower, space.upper))
-    return [
-        f"<b>{as_text(space.names[i])}</b> is {numbers[i]:.6g}; limits {lower[i]:.6g} to {upper[i]:.6g}"
-        for i in judgement.beyond
-    ]
+def _dim(text: str) -> str:
+    return f'<span style="color:{_DIM}">{text}</span>'

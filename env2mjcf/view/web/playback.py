@@ -72,7 +72,7 @@ def doubts(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:
     if not broken.any():
         return
     row, i = (int(x) for x in np.argwhere(broken)[0])
-    number, lower, upper = (scene.space.encode(v)[i] for v in (q[row], scene.space.lower, scene.space.upper))
+    number, lower, upper = (scene.space.in_file_units(v)[i] for v in (q[row], scene.space.lower, scene.space.upper))
     message = (
         f"{int(broken.any(axis=1).sum())} of {len(q)} configurations of {file} are beyond the limits; in number "
         f"{row + 1} {scene.space.names[i]} is {number:.6g}, its limits are {lower:.6g} to {upper:.6g}"

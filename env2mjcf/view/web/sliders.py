@@ -57,7 +57,7 @@ class Dials:
         shown = np.vstack([space.home[None], rows])
         self._low = space.encode(np.minimum(lower, shown.min(axis=0)))
         self._high = space.encode(np.maximum(upper, shown.max(axis=0)))
-        self._limits = [space.encode(ends) for ends in space.joint_limits]
+        self._limits = [space.in_file_units(ends) for ends in space.joint_limits]
         self._steps = np.array([_step(b - a) for a, b in zip(self._low, self._high, strict=True)])
         self.robots: tuple[tuple[Dial, ...], ...] = tuple(
             tuple(self._dial(scene, r, i) for i in range(columns.start, columns.stop))

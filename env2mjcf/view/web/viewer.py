@@ -1,4 +1,4 @@
-"""The viewer: what is shown, and who may change it."""
+"""The viewer: what is shown, and what may change it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...contact.types import Contact, Verdict, deepest
 from ...kinematics.transforms import Array
+from ...options import Engine
 from ...simulation.scene import Scene
-from ...simulation.verdicts import LiveJudge
 from ..trails import paced, reference_points
 from .newest import Newest
 from .nodes import WebScene, set_stage
@@ -21,7 +22,7 @@ from .sliders import Dials
 if TYPE_CHECKING:
     import viser
 
-# Draws for one valid configuration before it is said that none was found.
+# Draws for one valid configuration before giving up.
 _DRAWS = 2000
 _TRAIL_POINTS = 240
 
@@ -45,7 +46,9 @@ class Viewer:
         self._server, self._scene = server, scene
         # Reentrant: assigning to a slider calls back at once.
         self._lock = threading.RLock()
-        self._judge = LiveJudge(scene)
+        # The exact engine may have to be compiled for a minute, and gains nothing on single verdicts.
+        chosen = scene.compiled.options.engine
+        self._engine: Engine = "mujoco" if chosen == "auto" else chosen
         shown = [q.q for q in scene.queries] + ([path] if path is not None else [])
         rows = np.vstack([np.zeros((0, scene.space.dim)), *shown])
         self._dials = Dials(scene, rows)
@@ -61,7 +64,7 @@ class Viewer:
         if self._track is not None:
             self._player = Player(self._track.seconds, self._tick, self.page.paused)
             self._web.trail(reference_points(scene, paced(scene, self._track.q, _TRAIL_POINTS)[0]))
-        self._newest = Newest[Array](self._judge_shown)
+        self._newest = Newest[Array](self._explain)
         self.q = scene.space.home.copy()
         self.show(first)
 
@@ -81,7 +84,7 @@ class Viewer:
             self._newest.submit(q)
 
     def go(self, q: Array) -> None:
-        """Show a configuration that somebody chose: nothing plays any more."""
+        """Show a configuration that a user chose: nothing plays any more."""
         with self._lock:
             self.pause()
             self.show(q)
@@ -98,7 +101,7 @@ class Viewer:
         for _ in range(_DRAWS):
             self._draws += 1
             q = self._scene.space.sample(1, self._draws)[0]
-            if self._judge.valid(q):
+            if self._scene.is_valid(q, engine=self._engine):
                 self.go(q)
                 return
         self.page.notify(f"no valid configuration among {_DRAWS} that were drawn")
@@ -144,7 +147,7 @@ class Viewer:
 
     def _tick(self, fraction: float) -> None:
         with self._lock:
-            # Whoever paused it may have shown something else since.
+            # After a pause something else may be shown.
             if self._track is not None and self._player is not None and self._player.playing:
                 self.page.set_fraction(fraction)
                 self.show(self._track.at(fraction))
@@ -154,15 +157,18 @@ class Viewer:
             return path[0]
         return self._scene.queries[0].q[0] if self._scene.queries else self._scene.space.home
 
-    def _judge_shown(self, q: Array, overtaken: Callable[[], bool]) -> None:
-        judgement = self._judge.verdict(q)
-        if judgement.contacts is None and not overtaken():
-            self.page.report(judgement, q)
-            judgement = self._judge.judge(q)
-        if judgement.contacts is not None:
-            with self._lock, self._server.atomic():
-                self.page.report(judgement, q)
-                self._web.mark(judgement.contacts)
+    def _explain(self, q: Array, overtaken: Callable[[], bool]) -> None:
+        """Say what is wrong with q: at once whether anything touches, and what it is when that is found."""
+        touching = bool(self._scene.in_collision(q, engine=self._engine))
+        verdict, contacts = Verdict(q, self._scene.out_of_bounds(q)), list[Contact]()
+        if touching:
+            if overtaken():
+                return
+            self.page.report(verdict, looking=True)
+            contacts = self._scene.contacts(q, engine=self._engine)
+        with self._lock, self._server.atomic():
+            self.page.report(Verdict(q, (*deepest(contacts), *verdict.reasons)))
+            self._web.mark(contacts)
 
 
 def _is_enclosed(scene: Scene, q: Array) -> bool:

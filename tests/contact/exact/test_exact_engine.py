@@ -162,7 +162,7 @@ class TestClearance:
         """The numpy search, which answers where numba is not installed."""
         q = rows(model, 60, 9)
         q = q[~model.in_collision(q)][:10]
-        arrays = model._queries._triangles.clearance.signed(model._queries._poses_by_name(q), len(q))
+        arrays = model._solver._triangles.clearance.signed(model._solver._poses_by_name(q), len(q))
         np.testing.assert_allclose(model.clearance(q), arrays, atol=1e-9 * model.extent)
 
 
@@ -172,7 +172,7 @@ class TestEdges:
         q0, q1 = rows(model, 60, 10), rows(model, 60, 11)
         q1 = q0 + 0.2 * model.space.difference(q0, q1)
         expected = [
-            model.in_collision(model._queries.steps.rows(a, b, 0.02 * model.extent)).any()
+            model.in_collision(model._solver.steps.rows(a, b, 0.02 * model.extent)).any()
             for a, b in zip(q0, q1, strict=True)
         ]
         found = model.edge_in_collision(q0, q1, 0.02 * model.extent)
@@ -206,8 +206,8 @@ class TestEdges:
         q0 = q0[~model.in_collision(q0)][:8]
         q1 = q0 + 0.1 * model.space.difference(q0, np.roll(q0, 1, axis=0))
         compiled = model.edge_is_free(q0, q1)
-        monkeypatch.setattr(model._queries, "_default", "mujoco")
-        monkeypatch.setattr(model._queries, "_ready", None)
+        monkeypatch.setattr(model._solver, "_default", "mujoco")
+        monkeypatch.setattr(model._solver, "_ready", None)
         assert compiled.tolist() == model.edge_is_free(q0, q1).tolist()
 
     def test_are_none_if_there_are_none(self) -> None:
@@ -232,7 +232,7 @@ class TestEngines:
         monkeypatch.setattr(exact_engine, "find_spec", lambda name: None)
         scene = load("maze/maze")
         q = scene.space.sample(200, 15)
-        assert scene._queries._chosen("auto") is None
+        assert scene._solver._chosen("auto") is None
         np.testing.assert_array_equal(scene.in_collision(q), scene.in_collision(q, engine="mujoco"))
         with pytest.raises(ValueError, match=r"pip install 'env2mjcf\[fast\]'"):
             scene.in_collision(q, engine="exact")

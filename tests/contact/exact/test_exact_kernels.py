@@ -179,7 +179,7 @@ def test_steps_place_links_where_the_kinematics_do() -> None:
     checked = 0
     for path in sorted(MODELS.glob("*/*.env")):
         scene = env2mjcf.load(path, robots=tuple(path.parent.glob("*.robot")))
-        engine = scene._queries._chosen("exact")
+        engine = scene._solver._chosen("exact")
         tables = opened(*engine._tables)
         frames = np.empty((len(tables.steps), 12))
         for q in scene.space.sample(20, seed=1):
@@ -208,7 +208,7 @@ def test_steps_place_links_where_the_kinematics_do() -> None:
 def test_rays_count_as_winding_numbers_do() -> None:
     """Of the bottle, from points all over it, and from points whose rays go through corners of the mesh."""
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env")
-    tables = opened(*scene._queries._chosen("exact")._tables)
+    tables = opened(*scene._solver._chosen("exact")._tables)
     part, shape = scene.compiled.assembly.obstacles[0], int(tables.obstacles[0, 0])
     frame = tables.poses[0].reshape(3, 4)
     vertices = (part.analysis.vertices @ part.pose[:3, :3].T + part.pose[:3, 3] - frame[:, 3]) @ frame[:, :3]

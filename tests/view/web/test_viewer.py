@@ -18,8 +18,7 @@ from extras import skip_without
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
-from env2mjcf import Scene
-from env2mjcf.simulation.verdicts import LiveJudge
+from env2mjcf import Scene, Verdict
 from env2mjcf.view.web import page as wording
 from env2mjcf.view.web import server as web_server
 from env2mjcf.view.web.newest import Newest
@@ -118,21 +117,21 @@ def test_names_are_text_whatever_they_hold() -> None:
 def test_the_page_says_what_is_wrong_with_a_configuration(
     cube: Scene, x: float, y: float, words: str, reason: str
 ) -> None:
-    judge, q = LiveJudge(cube), np.array([x, y, 0, 0, 0, 0])
-    judgement = judge.verdict(q)
-    assert judgement.valid == cube.is_valid(q, engine="mujoco")
-    assert f">{words}</div>" in wording.status(judgement)
-    if judgement.collides:
-        assert "looking for contacts" in wording.reasons(judgement, cube, q)
-        judgement = judge.judge(q)
-    assert reason in wording.reasons(judgement, cube, q)
+    q = np.array([x, y, 0, 0, 0, 0])
+    verdict, touching = Verdict(q, cube.out_of_bounds(q)), cube.in_collision(q, engine="mujoco")
+    assert (verdict.valid and not touching) == cube.is_valid(q, engine="mujoco")
+    assert f">{words}</div>" in wording.status(verdict, looking=touching)
+    if touching:
+        assert "looking for contacts" in wording.reasons(verdict, cube.space, looking=True)
+        verdict = cube.explain(q, engine="mujoco")
+    assert reason in wording.reasons(verdict, cube.space)
 
 
 def test_a_broken_limit_is_told_in_the_numbers_of_the_file(arm: Scene) -> None:
     q = np.array([np.pi / 2])
-    judgement = LiveJudge(arm).verdict(q)
-    assert ">out of limits</div>" in wording.status(judgement)
-    assert "is 0.5; limits -0.333333 to 0.333333" in wording.reasons(judgement, arm, q)
+    verdict = arm.explain(q, engine="mujoco")
+    assert ">out of limits</div>" in wording.status(verdict)
+    assert "is 0.5; limits -0.333333 to 0.333333" in wording.reasons(verdict, arm.space)
 
 
 # While somebody drags.
