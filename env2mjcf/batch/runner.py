@@ -108,7 +108,7 @@ def run(
     refuse_unwritable(target, "CFG509", [configurations])
     for companion in companions(target):
         refuse_unwritable(companion, "CFG509", [configurations])
-    refuse_foreign(target, "CFG509", "NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
+    refuse_foreign(target, "CFG509", "a NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
     count = None if executor is not None and threads is None else thread_count(threads, len(source))
     job = identity(scene, what, file_units)
     partial = Partial(target)

@@ -150,8 +150,8 @@ def write(file: PathArgument, text: str) -> Path:
         ConversionError: It cannot be written.
     """
     path = Path(os.fspath(file))
-    with output(path, "CFG532") as beside:
-        beside.write_bytes(text.encode("utf-8"))
+    with output(path, "CFG532") as staged:
+        staged.write_bytes(text.encode("utf-8"))
     return path
 
 

@@ -8,7 +8,7 @@ from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Part, RobotParts
 from ..kinematics.tree import DofKind
 from .links import Compilation
-from .writer import Element, add, number
+from .markup import Element, add, number
 
 # A gain of m g r holds a link at one radian of error; this many times stiffer, at a hundredth.
 _STIFFNESS = 100.0

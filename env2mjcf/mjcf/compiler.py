@@ -22,8 +22,8 @@ from .checks import report_unused
 from .geoms import add_contacts, excluded_obstacles
 from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
+from .markup import Element, add, comment_text, numbers, plain, to_text
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky
-from .writer import Element, add, comment_text, numbers, plain, to_text
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from ..geometry.assembly import Part
 from ..kinematics.transforms import quaternion_from_matrix
 from ..pairs import PairTable
 from .assets import AssetBook
-from .writer import Element, add, comment, numbers
+from .markup import Element, add, comment, numbers
 
 # Links collide with everything; obstacles with links only. A geom that a user adds with MuJoCo's default masks (1, 1),
 # such as a floor, collides with links and not with obstacles.

@@ -10,7 +10,7 @@ from ..kinematics.qpos import joint_kinds
 from ..kinematics.transforms import inverse
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind
-from .writer import Element, add, number, numbers, tidy
+from .markup import Element, add, number, numbers, tidy
 
 _BASE_AXES = {
     DofKind.X: ("slide", "1 0 0"),

@@ -16,7 +16,7 @@ from ..options import Options
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
 from .joints import add_base_joints, add_connection_joints
-from .writer import Element, add, numbers, tidy
+from .markup import Element, add, numbers, tidy
 
 
 @dataclass(slots=True)

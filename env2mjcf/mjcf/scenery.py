@@ -14,7 +14,7 @@ from ..geometry.assembly import Assembly, Part
 from ..kinematics.transforms import Array
 from ..model.environment import Boundary
 from ..options import Options
-from .writer import Element, add, comment, number, numbers
+from .markup import Element, add, comment, number, numbers
 
 _STANDARD_GRAVITY = 9.80665
 OVERVIEW = (0.55, -1.0, 0.75)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -110,8 +110,8 @@ class DofMap:
         order: For each degree of freedom of the target, which one of the source it is.
     """
 
-    source: RobotKinematics
-    target: RobotKinematics
+    source: RobotKinematics = field(repr=False)
+    target: RobotKinematics = field(repr=False)
     order: tuple[int, ...]
 
     @classmethod

@@ -263,7 +263,7 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     shown = run(verb, "scene.env", *rest, *out, folder=tmp_path)
     assert (shown.returncode, shown.stdout) == (3, "")
     assert "error CFG552: none/a." in shown.stderr
-    assert "lies in none, which is no folder" in shown.stderr
+    assert "lies in none, which is not a folder" in shown.stderr
 
 
 def test_a_gl_library_that_is_none_is_wrong_usage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

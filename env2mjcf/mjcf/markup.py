@@ -1,18 +1,25 @@
-"""Writes MJCF text that is the same on every run: two-space indent, attributes in the order given."""
+"""MJCF as text: written the same on every run, and known again after somebody has edited it."""
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from ..formats.source import wide_encoding
 from ..kinematics.transforms import Array
 
 Element = Any  # lxml's classes have no public names
+
+# Without going back, which would take for ever in a file of many comments.
+_MJCF = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>]*>)*+<mujoco(?=[\s/>])", re.DOTALL)
+_VALUE = re.compile(r"""=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
 def number(value: float) -> str:
@@ -60,6 +67,29 @@ def comment_text(lines: Iterable[str], indent: str = "") -> str:
 
 
 def to_text(root: Element) -> str:
-    """Return the whole document, with a final newline."""
+    """Return the whole document, with a final newline: two-space indent, attributes in the order given."""
     etree.indent(root, space="  ")
     return etree.tostring(root, encoding="unicode") + "\n"
+
+
+def is_mjcf(data: bytes) -> bool:
+    """Return whether a text is MJCF, whatever its encoding, and whatever comments stand above it."""
+    return _MJCF.match(_decoded(data)) is not None
+
+
+def attribute_values(data: bytes) -> set[str]:
+    """Return the values of all attributes in a text in MJCF, and what looks like one, in a comment, say.
+
+    MuJoCo reads texts that are not well-formed, too.
+    """
+    values = {html.unescape(a or b) for a, b in _VALUE.findall(_decoded(data))}
+    with suppress(etree.XMLSyntaxError):
+        root: Element = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True))
+        values.update(value for element in root.iter(etree.Element) for value in element.attrib.values())
+    return values
+
+
+def _decoded(data: bytes) -> str:
+    wide = wide_encoding(data)
+    little = data[:1] != b"\0" and not data.startswith(b"\xfe")
+    return data.decode(f"{wide}-{'le' if little else 'be'}" if wide else "utf-8", "replace").lstrip("\ufeff")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 
 from ..diagnostics import DiagnosticLog
@@ -26,7 +26,7 @@ class Translation:
     """
 
     environment: Environment
-    notes: tuple[Diagnostic, ...]
+    notes: tuple[Diagnostic, ...] = field(repr=False)
     robots: tuple[DofMap, ...]
 
 
