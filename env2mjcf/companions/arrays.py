@@ -1,7 +1,4 @@
-"""The configurations of a batch: a NumPy file that is mapped, not read.
-
-MERGED: NumPy files of configurations, mapped and not read: one that declares more than it has takes no memory.
-"""
+"""NumPy files of configurations, mapped and not read: one that declares more than it has takes no memory."""
 
 from __future__ import annotations
 
@@ -47,19 +44,13 @@ class Source:
         return np.ascontiguousarray(self.rows[start:stop])
 
     def decoded(self, raw: NDArray[Any], start: int) -> Array:
-        """Return rows in metres and radians.
-
-        Args:
-            raw: Rows as they stand in the file.
-            start: Number of the first.
+        """Return rows, as they stand in the file from `start` on, in metres and radians.
 
         Raises:
             FormatError: A number is not finite, or too large.
         """
-        rows = coordinates(
-            raw, self.path, DiagnosticLog(), names=self.space.names, first=start,
-            hint="mend the row and run the same command again: what lies before it is kept",
-        )  # fmt: skip
+        hint = "mend the row and run the same command again: what lies before it is kept"
+        rows = coordinates(raw, self.path, DiagnosticLog(), names=self.space.names, first=start, hint=hint)
         return self.space.decode(rows) if self.file_units else rows
 
 
@@ -67,7 +58,7 @@ def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Sourc
     """Map a NumPy file.
 
     Raises:
-        FormatError: It is none, or does not hold rows of as many numbers as there are degrees of freedom.
+        FormatError: It is not one, or does not hold rows of as many numbers as there are degrees of freedom.
     """
     log, hint = DiagnosticLog(), _WHAT_TO_DO.format(dim=space.dim)
     if not Path(path).is_file():
@@ -97,17 +88,17 @@ def map_array(path: str, log: DiagnosticLog, hint: str = "") -> NDArray[Any]:
     Args:
         path: The file, which is there.
         log: Where findings go.
-        hint: What to do where it is none.
+        hint: What to do where it is not one.
 
     Raises:
-        FormatError: It is no such file, or shorter than its header says.
+        FormatError: It is not such a file, or shorter than its header says.
     """
     try:
         shape, dtype = _header(Path(path))
         array: Any = None if dtype.kind not in "fiu" else np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # NumPy's reader raises whatever it stumbles over
         why = str(error)[:200] or type(error).__name__
-        log.fail("CFG505", path, f"{path} is no NumPy file (.npy), or cut off: {why}", hint=hint)
+        log.fail("CFG505", path, f"{path} is not a NumPy file (.npy), or cut off: {why}", hint=hint)
     if array is None:
         found = f"{dtype} values in an array of shape {shape}"
         log.fail("CFG505", path, f"{path} holds {found}; expected floats", hint=hint)
@@ -145,11 +136,7 @@ def coordinates(
 
 
 def _header(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return the shape and the type that a file declares.
-
-    Raises:
-        Exception: It is none, or shorter than it declares; of whatever kind.
-    """
+    """Return the shape and the type that a file declares, or raise what NumPy does."""
     with path.open("rb") as file:
         shape, _, dtype = _HEADERS[np.lib.format.read_magic(file)](file)
         length = os.path.getsize(path) - file.tell()

@@ -9,10 +9,8 @@ from pathlib import PurePath
 from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic
 from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules
-from . import scene_parts as bounds
-from .losses import Losses
-from .robots import translate_obstacles, translate_robot
-from .scene_parts import DofMap
+from .robots import DofMap, translate_obstacles, translate_robot
+from .scene_parts import Losses, translated_boundary, translated_resolution
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +59,8 @@ def translate(
         environment,
         dialect=losses.dialect,
         multibodies=found,
-        boundary=bounds.boundary(environment, losses),
-        resolution=bounds.resolution(environment, losses),
+        boundary=translated_boundary(environment, losses),
+        resolution=translated_resolution(environment, losses),
         tasks=tuple(robots.maps[t.robot].task(t) for t in environment.tasks),
         semantics="planner",
         declared_multibodies=written,
@@ -88,7 +86,7 @@ class _Robots:
         _report_number(environment, losses)
 
     def get(self, source: MultiBody) -> MultiBody | None:
-        """Return the translation of a robot; None where the multibody is none."""
+        """Return the translation of a robot; None where the multibody is not a robot."""
         return self._by_id.get(id(source))
 
 
@@ -125,17 +123,11 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
 def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
     name, dialect = source.label or source.bodies[0].filename, losses.dialect
     if not losses.vocabulary.legacy_layout:
-        losses.lost(
-            "ENV174", name, f"dialect {dialect} has no surfaces; {name}, which only is drawn, is lost", "", source.span
-        )
+        message = f"dialect {dialect} has no surfaces; {name}, which is only drawn, is lost"
+        losses.lost("ENV174", name, message, span=source.span)
         return []
-    losses.lost(
-        "ENV174",
-        name,
-        f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an obstacle",
-        "",
-        source.span,
-    )
+    message = f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an obstacle"
+    losses.lost("ENV174", name, message, span=source.span)
     return list(translate_obstacles(source, losses))
 
 
@@ -144,18 +136,12 @@ def _report_number(environment: Environment, losses: Losses) -> None:
         return
     robots = environment.robots
     if not robots and environment.multibodies:
-        message = "add a robot, with robots=[...] (--robots) if it has a file of its own"
-        losses.refuse(
-            "ENV176", environment.name, "a scene without robot: dialect A takes its first multibody for one", message
-        )
+        hint = "add a robot, with robots=[...] (--robots) if it has a file of its own"
+        what = "a scene without a robot: dialect A takes its first multibody for one"
+        losses.refuse("ENV176", environment.name, what, hint=hint)
     if len(robots) > 1:
-        losses.lost(
-            "ENV176",
-            environment.name,
-            f"{len(robots)} robots; the planner of dialect A moves the first only, and takes the others for obstacles",
-            "",
-            robots[1].span,
-        )
+        message = f"{len(robots)} robots; the planner of dialect A moves the first, and takes the others for obstacles"
+        losses.lost("ENV176", environment.name, message, span=robots[1].span)
 
 
 def _report_xml(environment: Environment, losses: Losses) -> None:
@@ -165,9 +151,5 @@ def _report_xml(environment: Environment, losses: Losses) -> None:
     rules = environment.planner_rules
     # One link apart is the default.
     if rules.ignore_self_collision or rules.adjacent_links not in (None, 1):
-        losses.lost(
-            "ENV177",
-            environment.name,
-            "text files do not say which pairs of links are tested; what the problem file says about that is lost",
-            "choose with adjacent_links and self_collision",
-        )
+        message = "text files do not say which pairs of links are tested; what the problem file says about that is lost"
+        losses.lost("ENV177", environment.name, message, hint="choose with adjacent_links and self_collision")
