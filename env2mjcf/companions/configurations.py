@@ -47,7 +47,7 @@ def read_configurations(
         strict: Whether warnings are errors.
 
     Returns:
-        (n, dim) in metres and radians, in the order of the file.
+        (n, dim) in metres and radians, in the order of the file; of a query, robot by robot.
 
     Raises:
         FormatError: The file cannot be read, a row fits no robot, it holds none, or nothing in the scene can move.
