@@ -73,7 +73,7 @@ def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody
         pose = body.pose if fixed and body.pose is not None else six_numbers(matrix)
         yield replace(
             source,
-            bodies=(static_body(body, pose, losses),),
+            bodies=(_static_body(body, pose, losses),),
             connections=(),
             dialect=losses.dialect,
             dh_form=losses.rules.dh_form,
@@ -85,7 +85,7 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
     if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
         return source.bodies
     bases = build_tree(source, DiagnosticLog()).bases
-    bodies = [robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
+    bodies = [_robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
     if losses.vocabulary.legacy_layout:
         fixed = [b.base is BaseKind.FIXED for b in bodies]
         bodies = [replace(b, index=fixed[:i].count(fixed[i])) for i, b in enumerate(bodies)]
@@ -139,7 +139,7 @@ def _report_fixed_base(source: MultiBody, losses: Losses) -> None:
 _WORD = re.compile(r"[^\s#]\S*")
 
 
-def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
+def _robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     """Return one body of a robot.
 
     Args:
@@ -164,7 +164,7 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     return replace(dressed, base=base, pose=body.pose or Pose() if first or base is BaseKind.FIXED else None)
 
 
-def static_body(body: Body, pose: Pose, losses: Losses) -> Body:
+def _static_body(body: Body, pose: Pose, losses: Losses) -> Body:
     """Return the body of an obstacle or a surface."""
     dressed = _dressed(body, losses)
     return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.vocabulary.legacy_layout else None)

@@ -49,7 +49,8 @@ def translate(
     """
     log = DiagnosticLog(strict)
     losses = Losses(Dialect(dialect), log)
-    robots = _Robots(environment, losses)
+    robots = _robots(environment, losses)
+    maps = tuple(DofMap.of(a, b) for a, b in zip(environment.robots, robots, strict=True))
     found = _multibodies(environment, robots, losses)
     _report_xml(environment, losses)
     if environment.boundary is None and boundary is not None:
@@ -61,33 +62,23 @@ def translate(
         multibodies=found,
         boundary=translated_boundary(environment, losses),
         resolution=translated_resolution(environment, losses),
-        tasks=tuple(robots.maps[t.robot].task(t) for t in environment.tasks),
+        tasks=tuple(maps[t.robot].task(t) for t in environment.tasks),
         semantics="planner",
         declared_multibodies=written,
         attributes=(),
         planner_rules=PlannerRules(),
         diagnostics=tuple(log),
     )
-    return Translation(result, tuple(log), robots.maps)
+    return Translation(result, tuple(log), maps)
 
 
-class _Robots:
-    """The robots of a scene and their translations."""
-
-    def __init__(self, environment: Environment, losses: Losses) -> None:
-        sources = environment.robots
-        meets = bool(environment.obstacles)
-        files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
-        self.translated = tuple(
-            replace(translate_robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
-        )
-        self.maps = tuple(DofMap.of(a, b) for a, b in zip(sources, self.translated, strict=True))
-        self._by_id = {id(s): t for s, t in zip(sources, self.translated, strict=True)}
-        _report_number(environment, losses)
-
-    def get(self, source: MultiBody) -> MultiBody | None:
-        """Return the translation of a robot; None where the multibody is not a robot."""
-        return self._by_id.get(id(source))
+def _robots(environment: Environment, losses: Losses) -> tuple[MultiBody, ...]:
+    """Return the translation of each robot."""
+    sources, meets = environment.robots, bool(environment.obstacles)
+    files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
+    robots = [translate_robot(r, meets, losses) for r in sources]
+    _report_number(environment, losses)
+    return tuple(replace(r, robot_file=f) for r, f in zip(robots, files, strict=True))
 
 
 def _files(name: str, robots: Sequence[MultiBody]) -> list[str]:
@@ -102,10 +93,11 @@ def _kept(robot: MultiBody) -> str | None:
     return file if file is not None and PurePath(file).suffix.lower() != ".xml" else None
 
 
-def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> tuple[MultiBody, ...]:
+def _multibodies(environment: Environment, robots: Sequence[MultiBody], losses: Losses) -> tuple[MultiBody, ...]:
     found: list[MultiBody] = []
+    translated = {id(s): r for s, r in zip(environment.robots, robots, strict=True)}
     for source in environment.multibodies:
-        robot = robots.get(source)
+        robot = translated.get(id(source))
         if robot is not None:
             found.append(robot)
         elif source.kind in losses.vocabulary.kinds:

@@ -294,7 +294,7 @@ import numpy as np
 from env2mjcf.errors import DiagnosticLog, Env2MjcfError
 from env2mjcf.options import Limits
 import env2mjcf
-from env2mjcf.formats.arrays import map_array
+from env2mjcf.companions.arrays import map_array
 from env2mjcf.formats.byu import read_byu
 from env2mjcf.formats.gms import read_gms
 from env2mjcf.formats.lexer import parse_integer
