@@ -202,7 +202,7 @@ def test_ctrl_c_keeps_what_is_done(scene, tmp_path) -> None:
     program = (
         "import signal, sys; from env2mjcf.batch import runner; from env2mjcf.cli.main import main\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "running._FIRST = 200; running._GROWTH = 1\n"
+        "runner._FIRST = 200; runner._GROWTH = 1\n"
         "sys.exit(main(['batch', 'scene.env', 'q.npy', '-o', 'v.npy', '--engine', 'mujoco', '--what', 'clearance']))\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
