@@ -111,6 +111,7 @@ def test_a_scene_is_not_replaced_by_its_own_conversion(tmp_path: Path) -> None:
         ("a path.xml", lambda text: re.sub('file="(?:assets/)?', 'file="./assets/', text).encode()),
         ("not well-formed.xml", lambda text: text.replace('"', "'").replace("</mujoco>", "").encode()),
         ("comments.xml", lambda text: re.sub("(<(?:mesh|include) [^>]*>)", r"<!-- \1 -->", text).encode()),
+        ("a quotation mark is missing.xml", lambda text: re.sub(r'(\.(?:stl|xml))"', r"\1", text).encode()),
         ("damaged.xml", lambda text: text.encode() + b"<\xff"),
     ],
 )

@@ -19,7 +19,7 @@ from typing import IO
 
 from ..system.files import NoRegularFileError, beside, open_regular, replaced
 from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock
-from .markup import attribute_values
+from .markup import files_mentioned
 
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
 STALE_SECONDS = 3600.0
@@ -166,11 +166,11 @@ def _named(xml: Path) -> set[str]:
     for file in files:
         try:
             with open_regular(file) as stream:
-                values = attribute_values(stream.read())
+                mentioned = files_mentioned(stream.read())
         except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
             continue
-        found = {value: _ASSET.fullmatch(value) for value in values}
+        found = {name: _ASSET.fullmatch(name) for name in mentioned}
         names.update(asset[1] for asset in found.values() if asset)
-        included = (xml.parent / v for v, asset in found.items() if not asset and v.lower().endswith(_SCENES))
+        included = (xml.parent / n for n, asset in found.items() if not asset and n.lower().endswith(_SCENES))
         files += [path for path in included if path not in files and os.path.isfile(path)]
     return names

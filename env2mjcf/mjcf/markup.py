@@ -19,7 +19,7 @@ Element = Any  # lxml's classes have no public names
 
 # Without going back, which would take for ever in a file of many comments.
 _MJCF = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>]*>)*+<mujoco(?=[\s/>])", re.DOTALL)
-_VALUE = re.compile(r"""=\s*(?:"([^"]*)"|'([^']*)')""")
+_FILE = re.compile(r"""(?<![^\s"'<>=])[^\s"'<>=]+\.(?:stl|obj|xml|mjcf|urdf)""", re.IGNORECASE)
 
 
 def number(value: float) -> str:
@@ -77,16 +77,16 @@ def is_mjcf(data: bytes) -> bool:
     return _MJCF.match(_decoded(data)) is not None
 
 
-def attribute_values(data: bytes) -> set[str]:
-    """Return the values of all attributes in a text in MJCF, and what looks like one, in a comment, say.
+def files_mentioned(data: bytes) -> set[str]:
+    """Return what may name a file in a text in MJCF: the values of attributes, and words anywhere that look like one.
 
-    MuJoCo reads texts that are not well-formed, too.
+    A comment may keep a line for later, and MuJoCo reads texts that are not well-formed.
     """
-    values = {html.unescape(a or b) for a, b in _VALUE.findall(_decoded(data))}
+    names = set(_FILE.findall(html.unescape(_decoded(data))))
     with suppress(etree.XMLSyntaxError):
         root: Element = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True))
-        values.update(value for element in root.iter(etree.Element) for value in element.attrib.values())
-    return values
+        names.update(value for element in root.iter(etree.Element) for value in element.attrib.values())
+    return names
 
 
 def _decoded(data: bytes) -> str:
