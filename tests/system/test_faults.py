@@ -61,7 +61,7 @@ class TestKilled:
         def killer(number: int) -> Callable[[], int]:
             if at.startswith("before"):
                 return folders.kill_at(number, out)
-            return folders.kill_in(number, ("scene_folder.py", "writing.py", "locking.py"))
+            return folders.kill_in(number, ("mjcf/folder.py", "system/files.py", "system/locks.py"))
 
         env2mjcf.convert(scenes[0], out)
         clean = folders.files(out)
