@@ -219,10 +219,10 @@ def refuse_foreign(
     try:
         with open_regular(out) as file:
             beginning = file.read(size)
-    except PermissionError:
-        refuse_replacement(out, code, "may not be read", hint)
-    except OSError:  # a folder or a device, say
-        beginning = b"-"
+    except (IsADirectoryError, NoRegularFileError):
+        refuse_replacement(out, code, f"is not {kind}", hint)
+    except OSError as error:
+        refuse_replacement(out, code, f"cannot be read: {error.strerror or error}", hint)
     if beginning.strip() and not belongs(beginning):
         refuse_replacement(out, code, f"is not {kind}", hint)
 

@@ -291,14 +291,13 @@ class TestLimits:
 STARVED = f"""
 import resource, sys
 import numpy as np
-from env2mjcf.errors import DiagnosticLog, Env2MjcfError
-from env2mjcf.options import Limits
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Env2MjcfError
+from env2mjcf.limits import Limits
 import env2mjcf
 from env2mjcf.companions.arrays import map_array
-from env2mjcf.formats.byu import read_byu
-from env2mjcf.formats.gms import read_gms
-from env2mjcf.formats.lexer import parse_integer
-from env2mjcf.formats.obj import read_obj
+from env2mjcf.formats.meshes.byu import read_byu, read_gms
+from env2mjcf.formats.meshes.obj import read_obj
 from env2mjcf.formats.path import read_path
 from env2mjcf.formats.roadmap import read_roadmap
 from env2mjcf.formats.source import Source
