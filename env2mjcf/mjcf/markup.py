@@ -19,6 +19,7 @@ Element = Any  # lxml's classes have no public names
 
 # Without going back, which would take for ever in a file of many comments.
 _MJCF = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>]*>)*+<mujoco(?=[\s/>])", re.DOTALL)
+_ENDINGS = (".stl", ".obj", ".xml", ".mjcf", ".urdf")
 _FILE = re.compile(r"""(?<![^\s"'<>=])[^\s"'<>=]+\.(?:stl|obj|xml|mjcf|urdf)""", re.IGNORECASE)
 
 
@@ -78,14 +79,15 @@ def is_mjcf(data: bytes) -> bool:
 
 
 def files_mentioned(data: bytes) -> set[str]:
-    """Return what may name a file in a text in MJCF: the values of attributes, and words anywhere that look like one.
+    """Return what looks like the name of a file in a text in MJCF: values of attributes, and words anywhere.
 
     A comment may keep a line for later, and MuJoCo reads texts that are not well-formed.
     """
     names = set(_FILE.findall(html.unescape(_decoded(data))))
     with suppress(etree.XMLSyntaxError):
         root: Element = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True))
-        names.update(value for element in root.iter(etree.Element) for value in element.attrib.values())
+        values = (value for element in root.iter(etree.Element) for value in element.attrib.values())
+        names.update(value for value in values if value.lower().endswith(_ENDINGS))
     return names
 
 
