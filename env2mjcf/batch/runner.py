@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
-from ..companions.arrays import Source, open_source
+from ..companions.arrays import MappedRows, open_rows
 from ..contact.threads import thread_count
 from ..mjcf.compiler import package_version
 from ..options import PathArgument
@@ -100,7 +100,7 @@ def run(
     """
     if what not in WHAT:
         raise ValueError(f"what={what!r} is not one of {', '.join(map(repr, WHAT))}")
-    source = open_source(str(configurations), scene.space, file_units)
+    source = open_rows(str(configurations), scene.space, file_units)
     target = Path(output)
     refuse_unwritable(target, "CFG509", [configurations])
     for companion in companions(target):
@@ -123,7 +123,7 @@ def run(
 
 
 class _Work:
-    def __init__(self, scene: Scene, source: Source, partial: Partial, job: str, what: What) -> None:
+    def __init__(self, scene: Scene, source: MappedRows, partial: Partial, job: str, what: What) -> None:
         questions = {"collision": scene.in_collision, "valid": scene.is_valid, "clearance": scene.clearance}
         self._ask: Callable[..., Any] = questions[what]
         self._kind: type[np.generic] = np.float64 if what == "clearance" else np.bool_

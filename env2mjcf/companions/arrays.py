@@ -21,7 +21,7 @@ _WHAT_TO_DO = "write it with numpy.save(path, array), an array of floats of shap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class MappedRows:
     """Rows of a NumPy file.
 
     Attributes:
@@ -54,7 +54,12 @@ class Source:
         return self.space.decode(rows) if self.file_units else rows
 
 
-def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Source:
+def listed_names(space: ConfigurationSpace) -> str:
+    """Return the names of the first degrees of freedom, for a message."""
+    return ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
+
+
+def open_rows(path: str, space: ConfigurationSpace, file_units: bool) -> MappedRows:
     """Map a NumPy file.
 
     Raises:
@@ -66,12 +71,11 @@ def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Sourc
         log.fail("CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
     rows = map_array(path, log, hint)
     if rows.ndim != 2 or rows.shape[1] != space.dim:
-        names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
         if rows.shape == (space.dim,):
             hint = "one configuration is array.reshape(1, -1)"
-        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {names}"
+        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {listed_names(space)}"
         log.fail("CFG505", path, message, hint=hint)
-    return Source(path, rows, space, file_units)
+    return MappedRows(path, rows, space, file_units)
 
 
 # A header of version 3.0 is one of 2.0 in UTF-8, which only names of fields need.

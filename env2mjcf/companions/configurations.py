@@ -21,6 +21,7 @@ from ..options import PathArgument
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Query, Scene
 from .paths import path_record
+from .query_files import dofs_of
 from .records import Configurations, Graph, Poses, expected, joined, of_array, of_text, row_of
 from .roadmaps import roadmap_record, ways_between
 
@@ -120,7 +121,7 @@ def _of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
         if radians:
             raise ValueError("--radians is for plain numbers; paths and roadmaps are in units of their own")
         return reader(scene, source, log)
-    tasks = read_query(source, [s.stop - s.start for s in scene.space.robot_slices], log)
+    tasks = read_query(source, dofs_of(scene), log)
     rows = [Query(t.robot, _task_q(scene, t, radians), t.label) for t in tasks]
     return joined(scene, list(_task_rows(scene, rows)))
 

@@ -17,7 +17,8 @@ from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
-from .arrays import coordinates, map_array
+from .arrays import coordinates, listed_names, map_array
+from .query_files import dofs_of
 
 _WORD = re.compile(r"[^,;\s]+")
 
@@ -84,7 +85,7 @@ def row_of(scene: Scene, numbers: Sequence[float], radians: bool) -> Array | Non
     space = scene.space
     if len(numbers) == space.dim:
         return np.array(numbers) if radians else space.decode(numbers)
-    taken = split_row(numbers, [s.stop - s.start for s in space.robot_slices])
+    taken = split_row(numbers, dofs_of(scene))
     if taken is None:
         return None
     robot, values = taken
@@ -101,8 +102,7 @@ def expected(scene: Scene) -> str:
     space = scene.space
     if not space.dim:
         return "none: the scene has no robot that moves"
-    names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
-    dofs = [s.stop - s.start for s in space.robot_slices]
+    names, dofs = listed_names(space), dofs_of(scene)
     if len(dofs) == 1:
         return f"{space.dim} ({names})"
     each = ", ".join(f"{d} for robot {i}" for i, d in enumerate(dofs))
