@@ -1,6 +1,6 @@
 """Connections in another dialect: joint types, limits, units, DH form, and poses as six numbers that a file can hold.
 
-A connection in the other DH form has the same pose for every value of its joint: docs/format/kinematics.md.
+In the other DH form a connection has the same pose for every value of its joint; docs/format/kinematics.md has both.
 """
 
 from __future__ import annotations
