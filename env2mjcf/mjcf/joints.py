@@ -12,8 +12,7 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import RobotParts
-from ..kinematics.qpos import joint_kinds
-from ..kinematics.space import ConfigurationSpace
+from ..kinematics.space import ConfigurationSpace, joint_kinds
 from ..kinematics.transforms import inverse
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind

@@ -9,8 +9,7 @@ import numpy as np
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
-from ..kinematics.qpos import children_first_to_last
-from ..kinematics.space import ConfigurationSpace
+from ..kinematics.space import ConfigurationSpace, children_first_to_last
 from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind, build_tree
 from ..model.environment import Environment

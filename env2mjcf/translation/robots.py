@@ -36,7 +36,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
     if meets_obstacles:
         _report_fixed_base(source, losses)
     _report_bases(source, losses)
-    if source.adjacencies and not losses.vocabulary.adjacencies:
+    if source.adjacencies and not losses.rules.adjacencies:
         message = (
             f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
             "are lost, so that those links are tested"
@@ -54,7 +54,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
         connections=connections(source, losses),
         dialect=losses.dialect,
         dh_form=losses.rules.dh_form,
-        adjacencies=source.adjacencies if losses.vocabulary.adjacencies else (),
+        adjacencies=source.adjacencies if losses.rules.adjacencies else (),
         label=None,
         actuators=(),
         robot_file=None,
@@ -63,7 +63,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
 
 def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody]:
     """Yield an obstacle or a surface; dialects B to E have one multibody for each body."""
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
+    if source.dialect is losses.dialect and losses.rules.legacy_layout:
         yield replace(source, connections=connections(source, losses), dh_form=losses.rules.dh_form)
         return
     kinematics = RobotKinematics.of(source)
@@ -82,11 +82,11 @@ def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody
 
 
 def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
+    if source.dialect is losses.dialect and losses.rules.legacy_layout:
         return source.bodies
     bases = build_tree(source, DiagnosticLog()).bases
     bodies = [_robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
-    if losses.vocabulary.legacy_layout:
+    if losses.rules.legacy_layout:
         fixed = [b.base is BaseKind.FIXED for b in bodies]
         bodies = [replace(b, index=fixed[:i].count(fixed[i])) for i, b in enumerate(bodies)]
     return tuple(bodies)
@@ -95,7 +95,7 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
 def _label(source: MultiBody, losses: Losses) -> str | None:
     if source.kind is not MultiBodyKind.SURFACE:
         return None
-    labels = losses.vocabulary.surface_labels
+    labels = losses.rules.surface_labels
     if labels is SurfaceLabels.REQUIRED and source.dialect is not losses.dialect:
         return source.label or "surface"
     if labels is not SurfaceLabels.NONE:
@@ -106,7 +106,7 @@ def _label(source: MultiBody, losses: Losses) -> str | None:
 
 
 def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
-    if source.kind in losses.vocabulary.kinds or source.kind is MultiBodyKind.ACTIVE:
+    if source.kind in losses.rules.kinds or source.kind is MultiBodyKind.ACTIVE:
         return source if source.moves else replace(source, kind=MultiBodyKind.ACTIVE)
     if source.kind is MultiBodyKind.NON_HOLONOMIC:
         message = (
@@ -119,7 +119,7 @@ def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
 
 def _report_bases(source: MultiBody, losses: Losses) -> None:
     bases = [b for b in source.bodies if b.base is not BaseKind.JOINT]
-    if losses.vocabulary.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
+    if losses.rules.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
         message = f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one"
         losses.lost("ENV176", bases[1].filename, message, hint="split the robot", span=bases[1].span)
 
@@ -149,10 +149,10 @@ def _robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body
         losses: Where losses are reported.
     """
     dressed = _dressed(body, losses)
-    if not losses.vocabulary.legacy_layout:
+    if not losses.rules.legacy_layout:
         _report_home(body, base, losses)
         return replace(dressed, base=base, index=None, pose=(body.pose or Pose()) if base is BaseKind.FIXED else None)
-    # Dialect A's first FreeBody is a free base, every other one a link (env-format section 4).
+    # Dialect A's first FreeBody is a free base, every other one a link.
     free = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     if base not in (free, BaseKind.FIXED):
         message = (
@@ -167,7 +167,7 @@ def _robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body
 def _static_body(body: Body, pose: Pose, losses: Losses) -> Body:
     """Return the body of an obstacle or a surface."""
     dressed = _dressed(body, losses)
-    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.vocabulary.legacy_layout else None)
+    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.rules.legacy_layout else None)
 
 
 def _dressed(body: Body, losses: Losses) -> Body:
@@ -176,11 +176,11 @@ def _dressed(body: Body, losses: Losses) -> Body:
     if not _WORD.fullmatch(name):
         message = f"the file name {name!r} is not a single word, as names in text files are"
         losses.refuse("ENV178", name, message, hint="rename the mesh file", span=span)
-    if body.mass is not None and not losses.vocabulary.mass:
+    if body.mass is not None and not losses.rules.mass:
         message = f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost"
         losses.lost("ENV170", name, message, span=span)
         body = replace(body, mass=None)
-    if losses.vocabulary.options:
+    if losses.rules.options:
         return body
     if body.recentring is not Recentring.COM:
         message = (
@@ -257,7 +257,7 @@ class DofMap:
             value = float(configuration[old])
             if not dof.kind.is_length:
                 value *= ratio
-                # Turns go from 0 to 1, and pi units from -1 to 1 (env-format section 9.5).
+                # Turns go from 0 to 1, and pi units from -1 to 1.
                 if ratio > 1 and self.source.dofs[old].periodic:
                     value -= 2 * half_turn * math.floor(value / (2 * half_turn) + 0.5)
                     # 1.8 - 2 is not quite -0.2.

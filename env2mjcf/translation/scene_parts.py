@@ -10,7 +10,7 @@ from typing import NoReturn
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
 from ..formats.writers import settled
-from ..model.dialects import RULES, VOCABULARIES, DialectRules, Vocabulary
+from ..model.dialects import RULES, DialectRules
 from ..model.environment import Boundary, BoundaryShape, Dialect, Environment, Resolution
 
 _FLAT = {BoundaryShape.BOX: BoundaryShape.BOX2D, BoundaryShape.SPHERE: BoundaryShape.SPHERE2D}
@@ -33,13 +33,8 @@ class Losses:
 
     @property
     def rules(self) -> DialectRules:
-        """How the dialect reads."""
+        """How the dialect reads, and what it can express."""
         return RULES[self.dialect]
-
-    @property
-    def vocabulary(self) -> Vocabulary:
-        """What the dialect can express."""
-        return VOCABULARIES[self.dialect]
 
     def lost(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
         """Report what is left out or changed, while poses of links stay as they are."""
@@ -54,14 +49,14 @@ def translated_boundary(environment: Environment, losses: Losses) -> Boundary | 
     """Return the boundary, or what the dialect has in its place."""
     found, dialect = environment.boundary, losses.dialect
     if found is None:
-        return _wide(environment, losses) if losses.vocabulary.boundaries else None
+        return _wide(environment, losses) if losses.rules.boundaries else None
     if found.space != "workspace":
         losses.lost("ENV177", "Boundary", f"text files bound the workspace, not the {found.space}", span=found.span)
     fitting = replace(_fitting(found, environment, losses), space="workspace")
-    flat_ball = fitting.shape is BoundaryShape.SPHERE and len(fitting.center) == 2 and not losses.vocabulary.brackets
-    if fitting.shape in losses.vocabulary.boundaries and not flat_ball:
+    flat_ball = fitting.shape is BoundaryShape.SPHERE and len(fitting.center) == 2 and not losses.rules.brackets
+    if fitting.shape in losses.rules.boundaries and not flat_ball:
         return fitting
-    if not losses.vocabulary.boundaries:
+    if not losses.rules.boundaries:
         message = f"dialect {dialect} has no boundary in its file; it is lost"
         hint = "its planner takes one on the command line or in XML"
         losses.lost("ENV160", "Boundary", message, hint=hint, span=found.span)
@@ -73,7 +68,7 @@ def translated_boundary(environment: Environment, losses: Losses) -> Boundary | 
 
 def translated_resolution(environment: Environment, losses: Losses) -> Resolution:
     """Return the step sizes that the dialect can express."""
-    found, kept = environment.resolution, losses.vocabulary.resolution
+    found, kept = environment.resolution, losses.rules.resolution
     names = ("position", "position_factor", "orientation", "time", "rd")
     given = [name for name in names if getattr(found, name) is not None]
     lost = [name for name in given if name not in kept]
@@ -90,7 +85,7 @@ def translated_resolution(environment: Environment, losses: Losses) -> Resolutio
 def _fitting(found: Boundary, environment: Environment, losses: Losses) -> Boundary:
     """Name a boundary as the dialect does by the number of its axes."""
     axes = len(found.lower or found.center)
-    shapes = losses.vocabulary.boundaries
+    shapes = losses.rules.boundaries
     if axes == 3 or found.shape not in shapes:
         return replace(found, shape=_SOLID.get(found.shape, found.shape))
     flat = _FLAT.get(found.shape, found.shape)

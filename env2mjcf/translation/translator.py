@@ -75,7 +75,7 @@ def translate(
 def _robots(environment: Environment, losses: Losses) -> tuple[MultiBody, ...]:
     """Return the translation of each robot."""
     sources, meets = environment.robots, bool(environment.obstacles)
-    files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
+    files = _files(environment.name, sources) if losses.rules.robot_files else [None] * len(sources)
     robots = [translate_robot(r, meets, losses) for r in sources]
     _report_number(environment, losses)
     return tuple(replace(r, robot_file=f) for r, f in zip(robots, files, strict=True))
@@ -100,21 +100,21 @@ def _multibodies(environment: Environment, robots: Sequence[MultiBody], losses: 
         robot = translated.get(id(source))
         if robot is not None:
             found.append(robot)
-        elif source.kind in losses.vocabulary.kinds:
+        elif source.kind in losses.rules.kinds:
             found += translate_obstacles(source, losses)
         else:
             found += _surface(source, losses)
-    if losses.vocabulary.robot_files:
+    if losses.rules.robot_files:
         found.sort(key=lambda m: m.robot_file is not None)
-    elif losses.vocabulary.legacy_layout and environment.dialect is not losses.dialect:
-        # Its planner moves multibody 0, whatever the tag says (env-format section 4.2).
+    elif losses.rules.legacy_layout and environment.dialect is not losses.dialect:
+        # Its planner moves multibody 0, whatever the tag says.
         found.sort(key=lambda m: not m.moves)
     return tuple(found)
 
 
 def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
     name, dialect = source.label or source.bodies[0].filename, losses.dialect
-    if not losses.vocabulary.legacy_layout:
+    if not losses.rules.legacy_layout:
         message = f"dialect {dialect} has no surfaces; {name}, which is only drawn, is lost"
         losses.lost("ENV174", name, message, span=source.span)
         return []
@@ -124,7 +124,7 @@ def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
 
 
 def _report_number(environment: Environment, losses: Losses) -> None:
-    if not losses.vocabulary.legacy_layout or environment.dialect is losses.dialect:
+    if not losses.rules.legacy_layout or environment.dialect is losses.dialect:
         return
     robots = environment.robots
     if not robots and environment.multibodies:
