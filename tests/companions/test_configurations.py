@@ -87,7 +87,7 @@ def test_what_cannot_be_read_is_said(scene: Scene, tmp_path: Path, name: str, te
 
 def test_a_large_file_is_refused_and_warnings_are_errors_if_wanted(scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("1 2 3 4 5\n" * 100)
-    with pytest.raises(FormatError, match="at most"):
+    with pytest.raises(FormatError, match="more than 100 bytes"):
         env2mjcf.read_configurations(tmp_path / "a.csv", scene, limits=env2mjcf.Limits(file_bytes=100))
     (tmp_path / "a.query").write_text("0 1 2\n")  # no goal
     assert len(env2mjcf.read_configurations(tmp_path / "a.query", scene)) == 1
