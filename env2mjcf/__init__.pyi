@@ -14,6 +14,7 @@ from . import translation as translation
 from . import view as view
 from .companions import PathRecord as PathRecord
 from .companions import Roadmap as Roadmap
+from .companions import read_configurations as read_configurations
 from .companions import read_path as read_path
 from .companions import read_query as read_query
 from .companions import read_roadmap as read_roadmap

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from .diagnostics import DiagnosticLog
 from .errors import Diagnostic
 from .mjcf.folder import Staged
+from .mjcf.markup import is_mjcf
 from .model.environment import Environment
 from .options import Options, PathArgument
 from .report import Report
 from .simulation.loading import prepare
 from .simulation.mujoco_model import load_file
 from .simulation.scene import Scene
+from .system.files import refuse_foreign
 from .system.locks import FolderBusyError
 
 
@@ -35,10 +36,10 @@ class Conversion:
     """
 
     xml: Path
-    assets: tuple[Path, ...]
+    assets: tuple[Path, ...] = field(repr=False)
     environment: Environment
-    diagnostics: tuple[Diagnostic, ...]
-    report: Report
+    diagnostics: tuple[Diagnostic, ...] = field(repr=False)
+    report: Report = field(repr=False)
 
 
 def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion:
@@ -67,24 +68,11 @@ def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion
     else:
         folder, name = target, scene.compiled.document.name
     with _clear_write_errors(folder, log):
-        _refuse_foreign(folder / f"{name}.xml", log)
+        # Such as the XML environment that is being converted; any comments may stand above what tells what it is.
+        hint = "choose another output folder, or name the file: out/scene.xml"
+        refuse_foreign(folder / f"{name}.xml", "MJC423", "MJCF", is_mjcf, -1, hint)
         assets = _write(scene, folder, name, log)
     return Conversion(folder / f"{name}.xml", assets, scene.environment, scene.diagnostics, scene.report)
-
-
-def _refuse_foreign(final: Path, log: DiagnosticLog) -> None:
-    """Refuse to replace a file that is no MJCF, such as the XML environment that is being converted."""
-    if not final.exists():
-        return
-    text = re.sub(r"<\?.*?\?>|<!--.*?-->", "", _text(final), flags=re.DOTALL)
-    if not text.lstrip().startswith("<mujoco"):
-        hint = "choose another output folder, or name the file: out/scene.xml"
-        log.fail("MJC423", str(final), f"{final} is no MJCF, and is not replaced", hint=hint)
-
-
-def _text(path: Path) -> str:
-    # Devices and pipes may never end.
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
 
 
 def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[Path, ...]:

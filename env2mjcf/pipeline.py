@@ -16,8 +16,8 @@ from .kinematics.space import ConfigurationSpace
 from .kinematics.transforms import Array
 from .kinematics.tree import dof_names
 from .limits import Limits
-from .mjcf.checks import refuse_long_chains
 from .mjcf.compiler import Document, compile_mjcf
+from .mjcf.links import refuse_long_chains
 from .model.environment import Environment
 from .model.scaling import scaled
 from .options import Options, PathArgument
@@ -76,7 +76,7 @@ def _check_pairs(environment: Environment, options: Options, log: DiagnosticLog)
     count, at_most = links * obstacles + links * (links - 1) // 2, options.limits.pairs
     if count > at_most:
         message = (
-            f"{links} links and {obstacles} obstacles make {count} pairs of bodies; at most {at_most} are compared"
+            f"{links} links and {obstacles} obstacles make {count} pairs of bodies; {at_most} at most are compared"
         )
         log.fail("GEO275", environment.name, message, hint=Limits.hint("pairs"))
 

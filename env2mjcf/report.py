@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .geometry.certificate import Certificate
@@ -64,7 +64,7 @@ class Report:
     mass: float
     extent: float
     band: float
-    meshes: tuple[MeshReport, ...]
+    meshes: tuple[MeshReport, ...] = field(repr=False)
     diagnostics: dict[str, int]
 
     def to_dict(self) -> dict[str, Any]:

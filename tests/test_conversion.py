@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -88,12 +90,100 @@ def test_a_truncated_asset_is_written_again(tmp_path: Path) -> None:
 def test_a_scene_is_not_replaced_by_its_own_conversion(tmp_path: Path) -> None:
     shutil.copytree(MODELS / "xml-arm", tmp_path / "in")
     before = files(tmp_path / "in")
-    with pytest.raises(env2mjcf.ConversionError, match="is no MJCF") as caught:
+    with pytest.raises(env2mjcf.ConversionError, match="is not MJCF") as caught:
         env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in")
     assert caught.value.code == "MJC423"
     assert files(tmp_path / "in") == before
     env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in/model.xml")
     env2mjcf.convert(tmp_path / "in/xml-arm.xml", tmp_path / "in/model.xml")
+
+
+@pytest.mark.parametrize(
+    ("name", "edit"),
+    [
+        ("single quotes.xml", lambda text: text.replace('"', "'").encode()),
+        ("blanks.xml", lambda text: re.sub(r'file="', 'file\n = "', text).encode()),
+        ("UPPERCASE.XML", str.encode),
+        ("a byte-order mark.xml", lambda text: b"\xef\xbb\xbf" + text.encode()),
+        ("utf-16.xml", lambda text: ('<?xml version="1.0" encoding="UTF-16"?>\n' + text).encode("utf-16")),
+        ("utf-16 big-endian.xml", lambda text: b"\xfe\xff" + text.encode("utf-16-be")),
+        ("entities.xml", lambda text: text.replace(".stl", "&#46;stl").replace(".xml", "&#x2e;xml").encode()),
+        ("a path.xml", lambda text: re.sub('file="(?:assets/)?', 'file="./assets/', text).encode()),
+        ("not well-formed.xml", lambda text: text.replace('"', "'").replace("</mujoco>", "").encode()),
+        ("comments.xml", lambda text: re.sub("(<(?:mesh|include) [^>]*>)", r"<!-- \1 -->", text).encode()),
+        ("a quotation mark is missing.xml", lambda text: re.sub(r'(\.(?:stl|xml))"', r"\1", text).encode()),
+        ("damaged.xml", lambda text: text.encode() + b"<\xff"),
+    ],
+)
+def test_assets_that_an_edited_copy_names_stay(tmp_path: Path, name: str, edit: Callable[[str], bytes]) -> None:
+    path = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
+    first = env2mjcf.convert(path, tmp_path / "out")
+    (tmp_path / "out" / name).write_bytes(edit(first.xml.read_text()))
+    write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"), cube=box_mesh(0.4, 0.4, 0.4))
+    second = env2mjcf.convert(path, tmp_path / "out")
+    assert not set(first.assets) & set(second.assets)
+    assert all(asset.exists() for asset in first.assets)
+
+
+def test_assets_that_an_included_file_names_stay(tmp_path: Path) -> None:
+    path = write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"))
+    first = env2mjcf.convert(path, tmp_path / "out")
+    mujoco.MjSpec.from_file(str(first.xml))
+    (tmp_path / "out/parts").mkdir()
+    (tmp_path / "out/parts/all.xml").write_text(first.xml.read_text().replace("mujoco", "mujocoinclude"))
+    (tmp_path / "out/mine.xml").write_text("<mujoco><include file='parts/all.xml'/></mujoco>")
+    write_scene(tmp_path / "in", free_cube("5 0 0 0 0 0"), cube=box_mesh(0.4, 0.4, 0.4))
+    env2mjcf.convert(path, tmp_path / "out")
+    assert all(asset.exists() for asset in first.assets)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda text: b"\xef\xbb\xbf" + text.encode(),
+        lambda text: ('<?xml version="1.0" encoding="UTF-16"?>' + text).encode("utf-16"),
+        lambda text: text.encode("utf-16-be"),
+        lambda text: b"\n\n" + text.encode(),
+        lambda text: f"<?xml version='1.0'?>\r\n<!-- <mesh> -->\r\n{text}".replace("\n", "\r\n").encode(),
+        lambda text: f"<!DOCTYPE mujoco>\n{text}".replace('"', "'").encode(),
+        lambda text: f"<!-- {'long ' * 5000} -->\n{text}".encode(),
+        lambda _: b"\n",
+    ],
+)
+def test_its_own_scene_is_replaced_whatever_an_editor_did_to_it(tmp_path: Path, edit: Callable[[str], bytes]) -> None:
+    whole = env2mjcf.convert(SEED, tmp_path).xml
+    text = whole.read_text()
+    whole.write_bytes(edit(text))
+    env2mjcf.convert(SEED, tmp_path)
+    assert whole.read_text() == text
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"<mujocoinclude/>",
+        b"<!-- <mujoco> -->" * 40,
+        b"<Problem><mujoco/></Problem>",
+        b"mujoco",
+        "<robot/>".encode("utf-16"),
+    ],
+)
+def test_what_is_not_its_own_is_kept(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "seed.xml").write_bytes(content)
+    with pytest.raises(env2mjcf.ConversionError, match="is not MJCF, and is not replaced"):
+        env2mjcf.convert(SEED, tmp_path)
+    (tmp_path / "folder/seed.xml").mkdir(parents=True)
+    with pytest.raises(env2mjcf.ConversionError, match="is not MJCF, and is not replaced"):
+        env2mjcf.convert(SEED, tmp_path / "folder")
+    assert (tmp_path / "seed.xml").read_bytes() == content
+
+
+def test_what_is_returned_is_shown_in_a_line(tmp_path: Path) -> None:
+    result = env2mjcf.convert(SEED, tmp_path)
+    translated = env2mjcf.translate(result.environment, "C")
+    for shown in (result, result.report, result.environment, translated, translated.robots):
+        assert len(repr(shown)) < 500, repr(shown)
+    assert "seed.xml" in repr(result)
 
 
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:

@@ -6,10 +6,12 @@ is whole: a crash at any moment costs the last seconds, and nothing that is ther
 
 Files of these names may be somebody else's. A journal is ours if it begins as we begin it, or is cut off there; if the
 rest is damaged, the work begins anew. A partial output is ours if it is empty or lies beside a journal that is ours.
-What is not is kept, and the work refused.
+Other files are kept, and the work is refused.
 
-The partial output is locked as long as somebody writes it. Whoever creates, renames or removes one of these files holds
-the lock of the folder: no other batch begins between a look at a name and what is done to it.
+The partial output is locked as long as a process writes it. A process that creates, renames or removes one of these
+files holds the lock of the folder: no other batch begins between a look at a name and what is done to it.
+
+These names must be known to the next run, so they are not the hidden ones of `system.files`.
 """
 
 from __future__ import annotations
@@ -120,8 +122,7 @@ class Partial:
         """Lock the partial output, if it is ours."""
         # By name, too: where folders cannot be locked, another process may just have finished, and renamed it.
         if try_lock(self._handle) is LockOutcome.TAKEN or not self._is_ours():
-            message = f"another process is writing {self._partial}"
-            self._stop(message, "wait, or choose another output")
+            self._stop(f"another process is writing {self._partial}", "wait, or choose another output")
         if not has_journal and os.fstat(self._handle).st_size:
             self._refuse(self._partial)
         self._fresh.unlink(missing_ok=True)
@@ -137,15 +138,7 @@ class Partial:
         return None
 
     def begin(self, progress: Progress, kind: type[np.generic]) -> NDArray[Any]:
-        """Return room for answers, mapped.
-
-        Args:
-            progress: Whose they will be.
-            kind: Type of an answer.
-
-        Raises:
-            ConversionError: The disk has no room.
-        """
+        """Return room for answers of a type, mapped; fail with a ConversionError where the disk has no room."""
         try:
             # The journal comes first: without it, what a crash leaves would be nobody's.
             self.commit(progress)
@@ -173,11 +166,7 @@ class Partial:
         return self._answers
 
     def commit(self, progress: Progress) -> None:
-        """Put what is done on the disk, then say so.
-
-        Raises:
-            ConversionError: It cannot be written, or the partial output is no longer there.
-        """
+        """Put what is done on the disk, then say so; fail with a ConversionError where the partial output is gone."""
         self._sync()
         with self._mine(), self._fresh.open("x", encoding="utf-8") as file:
             try:
@@ -191,11 +180,7 @@ class Partial:
                 raise
 
     def finish(self) -> None:
-        """Give the whole output its name.
-
-        Raises:
-            ConversionError: It cannot be written, or the partial output is no longer there.
-        """
+        """Give the whole output its name; fail with a ConversionError where the partial output is gone."""
         self._sync()
         with self._mine():
             self._partial.replace(self._output)
@@ -219,10 +204,8 @@ class Partial:
         """Keep other batches out while the files are changed, which are still ours."""
         with self._alone():
             if not self._is_ours():
-                self._stop(
-                    f"{self._partial} was removed or replaced while it was written",
-                    "run the command again, and leave the file alone until it ends",
-                )
+                message = f"{self._partial} was removed or replaced while it was written"
+                self._stop(message, "run the command again, and leave the file alone until it ends")
             yield
 
     @contextmanager
@@ -231,9 +214,8 @@ class Partial:
             with alone(self._output.parent):
                 yield
         except FolderBusyError as error:
-            self._stop(
-                str(error), "is a process stopped in the middle of writing there? End it, or choose another output"
-            )
+            hint = "is a process stopped in the middle of writing there? End it, or choose another output"
+            self._stop(str(error), hint)
         except OSError as error:
             self._fail(error)
 
@@ -252,9 +234,8 @@ class Partial:
             self._fail(error)
 
     def _refuse(self, path: Path) -> NoReturn:
-        self._stop(
-            f"{path} was not left by an earlier run of this verb, and is kept", "remove it, or choose another output"
-        )
+        message = f"{path} was not left by an earlier run of this verb, and is kept"
+        self._stop(message, "remove it, or choose another output")
 
     def _fail(self, error: OSError) -> NoReturn:
         reason = f"{self._output} cannot be written: {error.strerror or error}"

@@ -1,7 +1,4 @@
-"""Asks a scene about all rows of a file, block by block, and goes on where an earlier run stopped.
-
-MERGED: What makes two batches the same, so that one may go on with what the other has done.
-"""
+"""Asks a scene about all rows of a file, block by block, and goes on where an earlier run of the same batch stopped."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -19,8 +15,9 @@ import numpy as np
 from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
-from ..companions.arrays import Source, open_source
+from ..companions.arrays import MappedRows, open_rows
 from ..contact.threads import thread_count
+from ..mjcf.compiler import package_version
 from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..system.files import refuse_foreign, refuse_unwritable
@@ -85,7 +82,7 @@ def run(
     anew. Files of these names that no batch has left are kept, and the call refused.
 
     Args:
-        scene: Whom to ask.
+        scene: The scene to ask.
         configurations: A .npy file of (n, dim) numbers, metres and radians.
         output: A .npy file, of (n,) bools or, for clearances, floats; replaced if it exists and is one.
         what: "collision", "valid" or "clearance".
@@ -103,12 +100,12 @@ def run(
     """
     if what not in WHAT:
         raise ValueError(f"what={what!r} is not one of {', '.join(map(repr, WHAT))}")
-    source = open_source(str(configurations), scene.space, file_units)
+    source = open_rows(str(configurations), scene.space, file_units)
     target = Path(output)
     refuse_unwritable(target, "CFG509", [configurations])
     for companion in companions(target):
         refuse_unwritable(companion, "CFG509", [configurations])
-    refuse_foreign(target, "CFG509", "NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
+    refuse_foreign(target, "CFG509", "a NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
     count = None if executor is not None and threads is None else thread_count(threads, len(source))
     job = identity(scene, what, file_units)
     partial = Partial(target)
@@ -126,10 +123,9 @@ def run(
 
 
 class _Work:
-    def __init__(self, scene: Scene, source: Source, partial: Partial, job: str, what: What) -> None:
-        self._ask: Callable[..., Any] = {
-            "collision": scene.in_collision, "valid": scene.is_valid, "clearance": scene.clearance
-        }[what]  # fmt: skip
+    def __init__(self, scene: Scene, source: MappedRows, partial: Partial, job: str, what: What) -> None:
+        questions = {"collision": scene.in_collision, "valid": scene.is_valid, "clearance": scene.clearance}
+        self._ask: Callable[..., Any] = questions[what]
         self._kind: type[np.generic] = np.float64 if what == "clearance" else np.bool_
         self._source, self._partial, self._job = source, partial, job
         self._digest = hashlib.blake2b(digest_size=20)
@@ -206,9 +202,7 @@ class _Work:
 
 
 def _summary(answers: NDArray[Any], what: What) -> tuple[dict[str, int], float | None]:
-    names = {
-        "collision": ("in collision", "free"), "valid": ("valid", "invalid"), "clearance": ("in collision", "free")
-    }[what]  # fmt: skip
+    names = ("valid", "invalid") if what == "valid" else ("in collision", "free")
     first, least = 0, np.inf
     step = _BYTES // 8
     for start in range(0, len(answers), step):
@@ -228,10 +222,9 @@ def identity(scene: Scene, what: str, file_units: bool) -> str:
     compiled, space = scene.compiled, scene.space
     options = compiled.options
     digest = hashlib.sha256()
-    facts = [
-        _version(), what, file_units, options.collision, options.engine, options.semantics, options.scale,
-        scene.pairs, space.names, repr(compiled.assembly.environment.boundary),
-    ]  # fmt: skip
+    chosen = (options.collision, options.engine, options.semantics, options.scale)
+    boundary = repr(compiled.assembly.environment.boundary)
+    facts = [package_version(), what, file_units, *chosen, scene.pairs, space.names, boundary]
     digest.update(json.dumps(facts).encode())
     for array in (space.lower, space.upper, space.periodic, space.home, space.decode(np.ones(space.dim))):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -243,10 +236,3 @@ def identity(scene: Scene, what: str, file_units: bool) -> str:
     for name, content in sorted(scene.assets.items()):
         digest.update(name.encode() + content)
     return digest.hexdigest()
-
-
-def _version() -> str:
-    try:
-        return version("env2mjcf")
-    except PackageNotFoundError:
-        return "a checkout"

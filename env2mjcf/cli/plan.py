@@ -89,7 +89,7 @@ class Plan:
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))
             for file in (Path(self.out), _approach(Path(self.out))):
                 refuse_foreign(
-                    file, "CFG553", "path file", lambda data: begins_as_path(data.decode("utf-8", "replace"))
+                    file, "CFG553", "a path file", lambda data: begins_as_path(data.decode("utf-8", "replace"))
                 )
         with working(f"loading {self.scene}"):
             scene = load(self.scene, **keywords(self.options))

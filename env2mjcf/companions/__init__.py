@@ -1,5 +1,6 @@
 """Files that stand beside a scene: paths, roadmaps and queries, read and written in the scene's own terms."""
 
+from .configurations import read_configurations as read_configurations
 from .paths import PathRecord as PathRecord
 from .paths import read_path as read_path
 from .paths import write_path as write_path

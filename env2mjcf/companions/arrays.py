@@ -1,7 +1,4 @@
-"""The configurations of a batch: a NumPy file that is mapped, not read.
-
-MERGED: NumPy files of configurations, mapped and not read: one that declares more than it has takes no memory.
-"""
+"""NumPy files of configurations, mapped and not read: one that declares more than it has takes no memory."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ _WHAT_TO_DO = "write it with numpy.save(path, array), an array of floats of shap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class MappedRows:
     """Rows of a NumPy file.
 
     Attributes:
@@ -47,27 +44,26 @@ class Source:
         return np.ascontiguousarray(self.rows[start:stop])
 
     def decoded(self, raw: NDArray[Any], start: int) -> Array:
-        """Return rows in metres and radians.
-
-        Args:
-            raw: Rows as they stand in the file.
-            start: Number of the first.
+        """Return rows, as they stand in the file from `start` on, in metres and radians.
 
         Raises:
             FormatError: A number is not finite, or too large.
         """
-        rows = coordinates(
-            raw, self.path, DiagnosticLog(), names=self.space.names, first=start,
-            hint="mend the row and run the same command again: what lies before it is kept",
-        )  # fmt: skip
+        hint = "mend the row and run the same command again: what lies before it is kept"
+        rows = coordinates(raw, self.path, DiagnosticLog(), names=self.space.names, first=start, hint=hint)
         return self.space.decode(rows) if self.file_units else rows
 
 
-def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Source:
+def listed_names(space: ConfigurationSpace) -> str:
+    """Return the names of the first degrees of freedom, for a message."""
+    return ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
+
+
+def open_rows(path: str, space: ConfigurationSpace, file_units: bool) -> MappedRows:
     """Map a NumPy file.
 
     Raises:
-        FormatError: It is none, or does not hold rows of as many numbers as there are degrees of freedom.
+        FormatError: It is not one, or does not hold rows of as many numbers as there are degrees of freedom.
     """
     log, hint = DiagnosticLog(), _WHAT_TO_DO.format(dim=space.dim)
     if not Path(path).is_file():
@@ -75,12 +71,11 @@ def open_source(path: str, space: ConfigurationSpace, file_units: bool) -> Sourc
         log.fail("CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
     rows = map_array(path, log, hint)
     if rows.ndim != 2 or rows.shape[1] != space.dim:
-        names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
         if rows.shape == (space.dim,):
             hint = "one configuration is array.reshape(1, -1)"
-        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {names}"
+        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {listed_names(space)}"
         log.fail("CFG505", path, message, hint=hint)
-    return Source(path, rows, space, file_units)
+    return MappedRows(path, rows, space, file_units)
 
 
 # A header of version 3.0 is one of 2.0 in UTF-8, which only names of fields need.
@@ -97,17 +92,17 @@ def map_array(path: str, log: DiagnosticLog, hint: str = "") -> NDArray[Any]:
     Args:
         path: The file, which is there.
         log: Where findings go.
-        hint: What to do where it is none.
+        hint: What to do where it is not one.
 
     Raises:
-        FormatError: It is no such file, or shorter than its header says.
+        FormatError: It is not such a file, or shorter than its header says.
     """
     try:
         shape, dtype = _header(Path(path))
         array: Any = None if dtype.kind not in "fiu" else np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # NumPy's reader raises whatever it stumbles over
         why = str(error)[:200] or type(error).__name__
-        log.fail("CFG505", path, f"{path} is no NumPy file (.npy), or cut off: {why}", hint=hint)
+        log.fail("CFG505", path, f"{path} is not a NumPy file (.npy), or cut off: {why}", hint=hint)
     if array is None:
         found = f"{dtype} values in an array of shape {shape}"
         log.fail("CFG505", path, f"{path} holds {found}; expected floats", hint=hint)
@@ -145,11 +140,7 @@ def coordinates(
 
 
 def _header(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return the shape and the type that a file declares.
-
-    Raises:
-        Exception: It is none, or shorter than it declares; of whatever kind.
-    """
+    """Return the shape and the type that a file declares, or raise what NumPy does."""
     with path.open("rb") as file:
         shape, _, dtype = _HEADERS[np.lib.format.read_magic(file)](file)
         length = os.path.getsize(path) - file.tell()

@@ -1,10 +1,8 @@
-"""Which configurations are to be checked: numbers of the command line, files, or the scene's own.
-
-MERGED: Paths and roadmaps as configurations to be checked, with the edges between them.
-"""
+"""Configurations out of files of every kind, numbers or the scene's own tasks, with the edges between them."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -19,12 +17,45 @@ from ..formats.source import Source, read_source
 from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..model.environment import Task
+from ..options import PathArgument
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Query, Scene
-from .local_planners import ways_between
 from .paths import path_record
+from .query_files import dofs_of
 from .records import Configurations, Graph, Poses, expected, joined, of_array, of_text, row_of
-from .roadmaps import roadmap_record
+from .roadmaps import roadmap_record, ways_between
+
+Indices = NDArray[np.int64]
+
+# Files of plain numbers; all others are in units of their own.
+_PLAIN = (".npy", ".csv", ".txt")
+
+
+def read_configurations(
+    path: PathArgument, scene: Scene, *, file_units: bool = False, limits: Limits | None = None, strict: bool = False
+) -> Array:
+    """Read the configurations that a file of any kind holds.
+
+    A NumPy file (.npy) or a text of rows (.csv, .txt) holds metres and radians: a row of all robots, or of one behind
+    its index, the others at home. A path (.path), the nodes of a roadmap (.map), or else a query, is in the units of
+    its own format; they are known by their text, whatever their names are.
+
+    Args:
+        path: The file.
+        scene: Whose configurations they are.
+        file_units: The numbers of a NumPy file or a text of rows are the env file's own, as in a query.
+        limits: Bounds on hostile input.
+        strict: Whether warnings are errors.
+
+    Returns:
+        (n, dim) in metres and radians, in the order of the file; of a query, robot by robot.
+
+    Raises:
+        FormatError: The file cannot be read, a row fits no robot, it holds none, or nothing in the scene can move.
+    """
+    name, log = os.fsdecode(path), DiagnosticLog(strict)
+    radians = not file_units and Path(name).suffix.lower() in _PLAIN
+    return of_file(scene, name, radians, limits or Limits(), log).q
 
 
 def of_scene(scene: Scene) -> Configurations:
@@ -38,7 +69,7 @@ def of_numbers(scene: Scene, words: Sequence[str], radians: bool) -> Configurati
     """Return the one configuration that stands on the command line.
 
     Raises:
-        ValueError: A word is no number, or there are too few or too many.
+        ValueError: A word is not a number, or there are too few or too many.
     """
     numbers: list[float] = []
     for word in words:
@@ -58,7 +89,8 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
     Paths (.path) and roadmaps (.map) are known by their text, too, whatever their names are.
 
     Raises:
-        FormatError: The file cannot be read, a row fits no robot, or there is none: nothing is neither valid nor seen.
+        FormatError: The file cannot be read, a row fits no robot, or there is none, which would be neither valid nor
+            invalid.
         ValueError: A path or roadmap is to be in radians.
     """
     refuse_without_freedom(scene, scene.environment.path, log)
@@ -70,11 +102,7 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
 
 
 def refuse_without_freedom(scene: Scene, path: str, log: DiagnosticLog) -> None:
-    """Refuse a scene in which nothing can move.
-
-    Raises:
-        FormatError: It is one.
-    """
+    """Refuse a scene in which nothing can move, with a FormatError."""
     if not scene.space.dim:
         what = "has no robot" if not scene.environment.robots else "has no robot that moves"
         hint = "is a robot file missing? Give it with --robots FILE"
@@ -93,7 +121,7 @@ def _of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
         if radians:
             raise ValueError("--radians is for plain numbers; paths and roadmaps are in units of their own")
         return reader(scene, source, log)
-    tasks = read_query(source, [s.stop - s.start for s in scene.space.robot_slices], log)
+    tasks = read_query(source, dofs_of(scene), log)
     rows = [Query(t.robot, _task_q(scene, t, radians), t.label) for t in tasks]
     return joined(scene, list(_task_rows(scene, rows)))
 
@@ -121,9 +149,6 @@ def _task_rows(scene: Scene, queries: Sequence[Query]) -> Iterator[tuple[str, Ar
         robot = f"robot {query.robot}, " if several else ""
         for n, row in enumerate(query.q, 1):
             yield f"{task}{robot}configuration {n} of {len(query.q)}", row
-
-
-Indices = NDArray[np.int64]
 
 
 def of_path(scene: Scene, source: Source, log: DiagnosticLog) -> Configurations:

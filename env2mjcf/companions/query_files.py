@@ -1,7 +1,4 @@
-"""Queries of a scene: starts, goals, and what is between.
-
-MERGED: Between a file's own numbers and configurations of a scene; and onto the disk.
-"""
+"""Queries of a scene (starts, goals, and what is between), and the numbers of all such files as configurations."""
 
 from __future__ import annotations
 
@@ -92,12 +89,7 @@ def out_of_turns(
 ) -> list[tuple[int, Sequence[float]]]:
     """Return rows of dialect A's time, whose angles are turns, in the units of the scene's dialect.
 
-    Args:
-        scene: Whose configurations they are.
-        rows: Rows (robot, its numbers in the file).
-        file: Name of the file.
-        span: Where it tells its age.
-        log: Where findings go.
+    Rows are (robot, its numbers in the file); `span` is where the file tells its age.
     """
     if scene.environment.dialect is Dialect.A or not rows:
         return list(rows)
@@ -119,23 +111,13 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
         ValueError: q has a wrong shape, a value that is not finite or too large, or there is no such robot.
     """
     space = scene.space
-    columns = columns_of(scene, robot)
-    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, columns]
+    count = len(space.robot_slices)
+    if not 0 <= robot < count:
+        raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
+    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, space.robot_slices[robot]]
     if (np.abs(numbers) > LARGEST).any():
         raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
     return numbers.tolist()
-
-
-def columns_of(scene: Scene, robot: int) -> slice:
-    """Return the columns of a robot.
-
-    Raises:
-        ValueError: There is no such robot.
-    """
-    count = len(scene.space.robot_slices)
-    if not 0 <= robot < count:
-        raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
-    return scene.space.robot_slices[robot]
 
 
 def written_index(scene: Scene, robot: int) -> int | None:
@@ -144,14 +126,10 @@ def written_index(scene: Scene, robot: int) -> int | None:
 
 
 def write(file: PathArgument, text: str) -> Path:
-    """Write a text, whole or not at all.
-
-    Raises:
-        ConversionError: It cannot be written.
-    """
+    """Write a text, whole or not at all; where it cannot be written, fail with a ConversionError."""
     path = Path(os.fspath(file))
-    with output(path, "CFG532") as beside:
-        beside.write_bytes(text.encode("utf-8"))
+    with output(path, "CFG532") as staged:
+        staged.write_bytes(text.encode("utf-8"))
     return path
 
 

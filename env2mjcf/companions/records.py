@@ -17,7 +17,8 @@ from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
-from .arrays import coordinates, map_array
+from .arrays import coordinates, listed_names, map_array
+from .query_files import dofs_of
 
 _WORD = re.compile(r"[^,;\s]+")
 
@@ -84,7 +85,7 @@ def row_of(scene: Scene, numbers: Sequence[float], radians: bool) -> Array | Non
     space = scene.space
     if len(numbers) == space.dim:
         return np.array(numbers) if radians else space.decode(numbers)
-    taken = split_row(numbers, [s.stop - s.start for s in space.robot_slices])
+    taken = split_row(numbers, dofs_of(scene))
     if taken is None:
         return None
     robot, values = taken
@@ -101,8 +102,7 @@ def expected(scene: Scene) -> str:
     space = scene.space
     if not space.dim:
         return "none: the scene has no robot that moves"
-    names = ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
-    dofs = [s.stop - s.start for s in space.robot_slices]
+    names, dofs = listed_names(space), dofs_of(scene)
     if len(dofs) == 1:
         return f"{space.dim} ({names})"
     each = ", ".join(f"{d} for robot {i}" for i, d in enumerate(dofs))
@@ -113,7 +113,7 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     """Read a NumPy file of rows.
 
     Raises:
-        FormatError: It is none, or a row fits no robot.
+        FormatError: It is not one, or a row fits no robot.
     """
     if not os.path.isfile(path) or os.path.getsize(path) > limits.file_bytes:
         read_source(path, log, limits, regular=True)  # says what is wrong
@@ -139,10 +139,13 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
     """Read a text of rows, numbers between commas or blanks; a first line without numbers names columns.
 
     Raises:
-        FormatError: A word is no finite number, or a row fits no robot.
+        FormatError: A word is not a finite number, or a row fits no robot.
     """
     found: list[tuple[str, Array]] = []
-    rows = ((line, start, _words(text)) for line, (start, text) in enumerate(source.lines(), 1))
+    rows = (
+        (line, start, list(_WORD.finditer(text.split("#", maxsplit=1)[0])))
+        for line, (start, text) in enumerate(source.lines(), 1)
+    )
     for n, (line, start, words) in enumerate(row for row in rows if row[2]):
         numbers = [coordinate(w.group()) for w in words]
         if n == 0 and not any(_looks_like_a_number(w.group()) for w in words):
@@ -150,10 +153,8 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
         wrong = next((w for w, x in zip(words, numbers, strict=True) if x is None), None)
         if wrong is not None:
             message = f"expected a row of finite numbers, found {wrong.group()[:60]!r}"
-            hint = coordinate_hint(wrong.group())
-            log.fail(
-                "CFG502", source.path, message, hint=hint, span=source.span(start + wrong.start(), start + wrong.end())
-            )
+            span = source.span(start + wrong.start(), start + wrong.end())
+            log.fail("CFG502", source.path, message, hint=coordinate_hint(wrong.group()), span=span)
         row = row_of(scene, [x for x in numbers if x is not None], radians)
         if row is None:
             message = f"a row of {len(words)} numbers; expected {expected(scene)}"
@@ -164,10 +165,6 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
         message = f"{source.path} holds no configuration; expected rows of numbers"
         log.fail("CFG503", source.path, message, span=source.line_span(1))
     return joined(scene, found)
-
-
-def _words(line: str) -> list[re.Match[str]]:
-    return list(_WORD.finditer(line.split("#", maxsplit=1)[0]))
 
 
 def _looks_like_a_number(word: str) -> bool:

@@ -1,11 +1,9 @@
-"""Roadmaps of a scene: configurations, and the straight ways between them.
-
-MERGED: Edges of a roadmap file, which stand at both of their ends, as edges that are there once.
-"""
+"""Roadmaps of a scene: configurations, and the ways between them, which stand at both of their ends in a file."""
 
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -18,6 +16,7 @@ from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic
 from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
+from ..formats.lexer import parse_number
 from ..formats.source import Source, read_source
 from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
@@ -27,6 +26,9 @@ from .query_files import configurations, dofs_of, file_numbers, out_of_turns, wr
 
 Indices = NDArray[np.int64]
 Rows = list[tuple[int, Sequence[float]]]
+
+_STRAIGHT = re.compile(r"straight\w*", re.IGNORECASE)
+_ROTATES = re.compile(r"rotate_?at_?s", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +85,9 @@ class Roadmap:
             robot: Whose it is.
 
         Raises:
-            TypeError: The robot is no whole number.
-            ValueError: Shapes do not belong together, a number is not finite or an index no whole number, or an edge
-                leads to no node, to its own, or stands there twice.
+            TypeError: The robot is not a whole number.
+            ValueError: Shapes do not belong together, a number is not finite, an index is not a whole number, or an
+                edge leads to no node, to its own, or stands there twice.
         """
         nodes = np.asarray(q, dtype=np.float64)
         pairs = _pairs(edges)
@@ -108,11 +110,9 @@ class Roadmap:
         if not (np.abs(nodes) <= LARGEST).all() or not (np.abs(given) <= LARGEST).all():
             raise ValueError(f"nodes or weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
         ways = tuple(np.asarray(b, dtype=np.float64).reshape(-1, nodes.shape[1]) for b in between)
-        none = np.zeros(n, dtype=np.int64)
-        return cls(
-            nodes, pairs, given, ways, np.arange(n), none + whole("robot", robot, 0), np.full((n, 3), np.nan),
-            np.full(m, -1, dtype=np.int64), none,
-        )  # fmt: skip
+        robots = np.full(n, whole("robot", robot, 0), dtype=np.int64)
+        info, planners, lines = np.full((n, 3), np.nan), np.full(m, -1, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        return cls(nodes, pairs, given, ways, np.arange(n), robots, info, planners, lines)
 
     def __len__(self) -> int:
         return len(self.q)
@@ -146,7 +146,7 @@ def roadmap_record(scene: Scene, source: Source, log: DiagnosticLog) -> Roadmap:
         log.info("CFG531", source.path, f"{found.dropped} are not used")
     nodes = found.nodes
     rows: Rows = [(n.robot, n.configuration) for n in nodes]
-    kept = undirected(source, nodes, log)
+    kept = _undirected(source, nodes, log)
     robots = np.array([n.robot for n in nodes], dtype=np.int64)
     edges = np.array([pair for pair, _ in kept], dtype=np.int64).reshape(-1, 2)
     between: Rows = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
@@ -228,16 +228,11 @@ def _nodes(scene: Scene, roadmap: Roadmap) -> list[Node]:
 Pair = tuple[int, int]
 
 
-def undirected(source: Source, nodes: Sequence[Node], log: DiagnosticLog) -> list[tuple[Pair, Edge]]:
+def _undirected(source: Source, nodes: Sequence[Node], log: DiagnosticLog) -> list[tuple[Pair, Edge]]:
     """Return each edge once: the indices of its nodes, the lower one first, and what it is from there.
 
     Edges that lead to no node, to their own, or to one of another robot are dropped with a diagnostic. One that stands
-    at one end only is kept, with a diagnostic.
-
-    Args:
-        source: The file.
-        nodes: In file order. Where two have one id, edges lead to the first.
-        log: Where findings go.
+    at one end only is kept, with a diagnostic. Where two nodes have one id, edges lead to the first.
     """
     index: dict[int, int] = {}
     findings: dict[str, list[Node]] = {}
@@ -258,7 +253,12 @@ def undirected(source: Source, nodes: Sequence[Node], log: DiagnosticLog) -> lis
                 back.setdefault((j, i), edge)
     findings["CFG527"] = [nodes[i] for i, _ in sorted(there.keys() ^ back.keys())]
     _report(source, findings, log)
-    return [(pair, there[pair] if pair in there else _reversed(back[pair])) for pair in sorted({*there, *back})]
+    there |= {
+        pair: dataclasses.replace(edge, intermediates=edge.intermediates[::-1])
+        for pair, edge in back.items()
+        if pair not in there
+    }
+    return sorted(there.items(), key=lambda item: item[0])
 
 
 def _fault(nodes: Sequence[Node], i: int, j: int | None) -> str:
@@ -267,10 +267,6 @@ def _fault(nodes: Sequence[Node], i: int, j: int | None) -> str:
     if i == j:
         return "CFG528"
     return "CFG533" if nodes[i].robot != nodes[j].robot else ""
-
-
-def _reversed(edge: Edge) -> Edge:
-    return dataclasses.replace(edge, intermediates=edge.intermediates[::-1])
 
 
 _WHAT = {
@@ -287,6 +283,51 @@ def _report(source: Source, findings: dict[str, list[Node]], log: DiagnosticLog)
         if nodes:
             what, hint = _WHAT[code]
             many = "" if len(nodes) == 1 else "s"
-            first = f", the first at node {nodes[0].vid}"
-            message = f"{len(nodes)} {what.format(many)}{first}"
+            message = f"{len(nodes)} {what.format(many)}, the first at node {nodes[0].vid}"
             log.warn(code, source.path, message, hint=hint, span=source.line_span(nodes[0].line))
+
+
+def ways_between(scene: Scene, roadmap: Roadmap, log: DiagnosticLog) -> tuple[Array, ...]:
+    """Return the configurations on each edge's way, (k, dim), both ends left out.
+
+    Those of the file, and the corners of `rotate_at_s`, which moves the base without turning anything for a fraction s
+    of the way, turns there, and moves on. What other local planners did is not known: their edges are taken as
+    straight, with a finding.
+    """
+    names = roadmap.header.local_planners
+    between = list(roadmap.intermediates)
+    unknown: dict[str, int] = {}
+    for edge, planner in enumerate(roadmap.planners.tolist()):
+        # Planners are counted from 1.
+        name = names[planner - 1] if 0 < planner <= len(names) else ""
+        if planner < 0 or len(between[edge]) or _STRAIGHT.match(name):
+            continue
+        fraction = _turning_point(name)
+        if fraction is None:
+            unknown[name or str(planner)] = unknown.get(name or str(planner), 0) + 1
+        else:
+            between[edge] = _rotating_at(scene, roadmap, edge, fraction)
+    for name, count in unknown.items():
+        edges = f"{count} edge{'' if count == 1 else 's'} made by the local planner '{name}'"
+        log.info("CFG534", roadmap.file, f"{edges}, which may have left the straight way; checked as straight")
+    return tuple(between)
+
+
+def _turning_point(name: str) -> float | None:
+    """Return s of `rotate_at_s`; None for other planners, and where several are named."""
+    if not _ROTATES.match(name):
+        return None
+    numbers = [n for n in map(parse_number, name.split()) if n is not None]
+    return numbers[0] if len(numbers) == 1 else None
+
+
+def _rotating_at(scene: Scene, roadmap: Roadmap, edge: int, fraction: float) -> Array:
+    i, j = roadmap.edges[edge].tolist()
+    robot = int(roadmap.robots[i])
+    dofs = scene.compiled.assembly.robots[robot].kinematics.dofs
+    columns = np.arange(scene.space.dim)[scene.space.robot_slices[robot]]
+    moves = columns[[d.connection is None and d.kind.is_length for d in dofs]]
+    corners = roadmap.q[[i, j]].copy()
+    # The file lists the edge from both ends, and s counts from the one that it was made from: one half is the same.
+    corners[:, moves] = (1 - fraction) * roadmap.q[i, moves] + fraction * roadmap.q[j, moves]
+    return corners

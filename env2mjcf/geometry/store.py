@@ -6,7 +6,6 @@ import hashlib
 import os
 import platform
 import re
-import secrets
 import struct
 import sys
 import time
@@ -23,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..system.files import NoRegularFileError, open_regular
+from ..system.files import NoRegularFileError, open_regular, replaced
 from .packing import pack, unpack
 
 T = TypeVar("T")
@@ -167,17 +166,14 @@ class GeometryCache:
         size = sum(a.nbytes for a in arrays.values())
         if not self._writable or size > self.limit:
             return
-        beside = path.with_name(f".{path.stem}-{secrets.token_hex(8)}.npz")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                with beside.open("xb") as file:
-                    # `pack` holds plain numbers only, and allow_pickle=False names one more array to numpy below 2.1.
-                    entry: dict[str, Any] = {"digest": _digest(key, arrays), **arrays}
-                    np.savez(file, **entry)
-                os.replace(beside, path)
-            finally:
-                beside.unlink(missing_ok=True)
+            if path.exists() and not path.is_file():
+                path.unlink()  # a pipe, say: this folder holds entries only
+            with replaced(path) as staged:
+                # `pack` holds plain numbers only, and allow_pickle=False names one more array to numpy below 2.1.
+                entry: dict[str, Any] = {"digest": _digest(key, arrays), **arrays}
+                np.savez(staged, **entry)
             self._make_room(path, size)
         except FileNotFoundError:
             pass  # another process has cleared the folder

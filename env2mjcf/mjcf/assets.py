@@ -15,7 +15,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
 from ..kinematics.transforms import Array
 from ..model.names import file_stem, mesh_stem, unique
-from .writer import Element, add, numbers, to_text
+from .markup import Element, add, numbers, to_text
 
 ASSET_FOLDER = "assets"
 

@@ -1,7 +1,4 @@
-"""Compiles an assembled scene into one MJCF document and its assets.
-
-MERGED: Keyframes: the home configuration, and start and goal of the first task.
-"""
+"""Compiles an assembled scene into one MJCF document and its assets, and says what has no meaning there."""
 
 from __future__ import annotations
 
@@ -13,17 +10,19 @@ from lxml import etree
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
-from ..model.environment import Task
+from ..model.environment import Environment, Task
 from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
-from .actuators import add_actuators
-from .checks import report_unused
 from .geoms import add_contacts, excluded_obstacles
+from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
+from .markup import Element, add, comment_text, numbers, plain, to_text
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky
-from .writer import Element, add, comment_text, numbers, plain, to_text
+
+# Attributes of an <Environment> node that concern the planner's own simulation.
+_PHYSICS = ("gravity", "frictionCoefficient")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +64,9 @@ def compile_mjcf(
     add_contacts(root, pairs, compilation.owners)
     add_loops(root, compilation, log)
     if options.actuators == "position":
-        add_actuators(root, compilation, log)
-    report_unused(environment, options, log)
-    add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
+        add_actuators(root, assembly.robots, space, log)
+    _report_unused(environment, options, log)
+    _add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(
         file_stem(environment.name),
@@ -103,7 +102,7 @@ def package_version() -> str:
         return "unknown"
 
 
-def add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
+def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
     """Append `home`, and `start` and `goal` where there is a task."""
     keys = {"home": space.home}
     if tasks and len(tasks[0].configurations):
@@ -116,3 +115,22 @@ def add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, .
         qpos = space.qpos(q)
         ctrl = [qpos[s.address] for slots in space.slots for s in slots if not s.free]
         add(keyframe, "key", name=name, qpos=numbers(qpos), ctrl=numbers(ctrl) if actuated and ctrl else None)
+
+
+def _report_unused(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    """Report textures, controls and physical attributes, which are kept and not written, and options without effect."""
+    if options.boundary is not None and environment.boundary is None:
+        log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
+    attributes = dict(environment.attributes)
+    for name in _PHYSICS:
+        if name in attributes:
+            message = f"{name}={attributes[name]!r} of the file is the planner's, and is not written"
+            hint = "give gravity=(x, y, z) (--gravity)" if name == "gravity" else ""
+            log.info("MJC412", name, message, hint=hint)
+    for multibody in environment.multibodies:
+        if multibody.controls or multibody.velocity_bounds:
+            message = f"{len(multibody.controls)} controls and the velocity bounds of the robot are kept, not written"
+            log.info("MJC413", "NonHolonomic", message, span=multibody.span)
+        for body in multibody.bodies:
+            if body.texture is not None:
+                log.info("MJC414", body.filename, f"texture {body.texture!r} is kept, not drawn", span=body.span)

@@ -1,32 +1,33 @@
 """The folder that scenes are written into, by several processes at once if need be.
 
 A writer first puts its MJCF there under a staged name, which tells every other process what assets it counts on, then
-the assets that are missing, then lets MuJoCo load it, and renames it last. Whoever changes the folder holds its lock:
-nobody removes an asset between another's look at it and the MJCF that names it. The lock is not held while MuJoCo
-loads. It is a lock of the folder itself, so it leaves no file behind, and a process that dies leaves it open.
+the assets that are missing, then lets MuJoCo load it, and renames it last. A process holds the folder's lock while it
+changes the folder: none removes an asset between another's look at it and the MJCF that names it. The lock is not held
+while MuJoCo loads. It is a lock of the folder itself, so it leaves no file behind, and a process that dies leaves it
+open.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import secrets
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import IO
 
-from ..system.files import NoRegularFileError, open_regular, replaced
+from ..system.files import NoRegularFileError, beside, open_regular, replaced
 from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock
+from .markup import files_mentioned
 
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
 STALE_SECONDS = 3600.0
 
 _STAGED = re.compile(r"\..+-[0-9a-f]{16}\.xml")
-_STAGED_ASSET = re.compile(r"\.[0-9a-f]{16}-[^/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml)")
-_ASSET = re.compile(r'\bfile="(?:assets/)?([^"/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))"')
-
-_BINARY = getattr(os, "O_BINARY", 0)
+_STAGED_ASSET = re.compile(r"\..+-[0-9a-f]{12}-[0-9a-f]{16}\.(?:stl|obj|xml)")
+_ASSET = re.compile(r"(?:.*[/\\])?([^/\\]+-[0-9a-f]{12}\.(?:stl|obj|xml))", re.DOTALL)
+_SCENES = (".xml", ".mjcf", ".urdf")
 
 
 class Staged:
@@ -46,21 +47,22 @@ class Staged:
     def __init__(self, folder: Path, name: str, xml: bytes, assets: Mapping[str, bytes]) -> None:
         self.folder = folder
         self.final = folder / f"{name}.xml"
-        self.path = folder / _staged_name(name)
+        self.path = beside(self.final)
         self.assets = tuple(folder / relative for relative in assets)
         self._made: set[str] = set()
         self._retired: Path | None = None
-        self._handle, self._begun = -1, False
+        self._file: IO[bytes] | None = None
+        self._begun = False
         (folder / "assets").mkdir(parents=True, exist_ok=True)
         try:
             with alone(folder):
                 with suppress(OSError):
                     _remove_stale(folder)
                 self._begun = True
-                self._handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o666)
-                # Held for as long as this process needs it: it is not stale, however old it is.
-                try_lock(self._handle)
-                _write_whole(self._handle, xml)
+                # Open and locked for as long as this process needs it: it is not stale, however old it is.
+                self._file = self.path.open("xb", 0)
+                try_lock(self._file.fileno())
+                self.path.write_bytes(xml)
                 for relative, data in assets.items():
                     self._provide(folder / relative, data)
         except BaseException:
@@ -71,8 +73,8 @@ class Staged:
         # The name holds the hash of the content: what is there and whole is right.
         if path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data:
             return
-        with replaced(path) as beside:
-            beside.write_bytes(data)
+        with replaced(path) as staged:
+            staged.write_bytes(data)
         self._made.add(path.name)
 
     def commit(self) -> None:
@@ -93,11 +95,14 @@ class Staged:
     def _retire(self) -> None:
         """Keep the scene of this name that was there before under a staged name, if it has assets that go with it.
 
-        Whoever comes after a process that is killed knows from it what to remove.
+        If this process is killed, the next one knows from it what to remove.
         """
-        if _named(self.final) <= {asset.name for asset in self.assets}:
+        try:
+            if _named(self.final) <= {asset.name for asset in self.assets}:
+                return
+        except PermissionError:  # of a file that it includes: its assets stay
             return
-        self._retired = self.path.with_name(_staged_name(self.final.stem))
+        self._retired = beside(self.final)
         self._retired.write_bytes(self.final.read_bytes())
 
     def _remove_retired(self) -> None:
@@ -114,30 +119,16 @@ class Staged:
             self._remove_retired()
 
     def _close(self) -> None:
-        handle, self._handle = self._handle, -1
-        if handle >= 0:
-            os.close(handle)
-
-
-def _staged_name(name: str) -> str:
-    return f".{name}-{secrets.token_hex(8)}.xml"
-
-
-def _write_whole(handle: int, data: bytes) -> None:
-    left = memoryview(data)
-    while left:
-        left = left[os.write(handle, left) :]
+        if self._file is not None:
+            self._file.close()
 
 
 def _remove_stale(folder: Path) -> None:
     """Remove what killed processes have left: staged files, and assets that only those name."""
     for staged in _old(folder, _STAGED):
-        handle = os.open(staged, os.O_RDONLY)
-        try:
-            if try_lock(handle) is not LockOutcome.TAKEN:
+        with staged.open("rb") as file:
+            if try_lock(file.fileno()) is not LockOutcome.TAKEN:
                 _remove(folder, staged)
-        finally:
-            os.close(handle)
     for staged in _old(folder / "assets", _STAGED_ASSET):
         staged.unlink(missing_ok=True)
 
@@ -145,10 +136,8 @@ def _remove_stale(folder: Path) -> None:
 def _old(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
     before = time.time() - STALE_SECONDS
     with os.scandir(folder) as listing:
-        return [
-            Path(item.path) for item in listing
-            if pattern.fullmatch(item.name) and item.is_file(follow_symlinks=False) and item.stat().st_mtime < before
-        ]  # fmt: skip
+        files = [i for i in listing if pattern.fullmatch(i.name) and i.is_file(follow_symlinks=False)]
+        return [Path(i.path) for i in files if i.stat().st_mtime < before]
 
 
 def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> None:
@@ -161,7 +150,7 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
     if left:
         # Not by `Path.glob`, which takes a folder that cannot be listed for an empty one.
         with os.scandir(folder) as listing:
-            scenes = [Path(item.path) for item in listing if item.name.endswith(".xml")]
+            scenes = [Path(item.path) for item in listing if item.name.lower().endswith(_SCENES)]
         for scene in scenes:
             if scene != staged:
                 left -= _named(scene)
@@ -171,9 +160,17 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
 
 
 def _named(xml: Path) -> set[str]:
-    """Return the asset files that an MJCF file names."""
-    try:
-        with open_regular(xml) as file:
-            return set(_ASSET.findall(file.read().decode("utf-8", "replace")))
-    except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
-        return set()
+    """Return the asset files that an MJCF file names, itself or in a file that it includes."""
+    names: set[str] = set()
+    files = [xml]
+    for file in files:
+        try:
+            with open_regular(file) as stream:
+                mentioned = files_mentioned(stream.read())
+        except (FileNotFoundError, IsADirectoryError, NoRegularFileError):
+            continue
+        found = {name: _ASSET.fullmatch(name) for name in mentioned}
+        names.update(asset[1] for asset in found.values() if asset)
+        included = (xml.parent / n for n, asset in found.items() if not asset and n.lower().endswith(_SCENES))
+        files += [path for path in included if path not in files and os.path.isfile(path)]
+    return names

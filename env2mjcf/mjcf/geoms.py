@@ -1,7 +1,4 @@
-"""Geoms of one body: the mesh that is drawn, and the convex cells that collide.
-
-MERGED: Contact filters: which bodies are not tested, and static pairs that MuJoCo would not test by itself.
-"""
+"""Geoms of one body, the mesh that is drawn and the convex cells that collide, and which of them are tested."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from ..geometry.assembly import Part
 from ..kinematics.transforms import quaternion_from_matrix
 from ..pairs import PairTable
 from .assets import AssetBook
-from .writer import Element, add, comment, numbers
+from .markup import Element, add, comment, numbers
 
 # Links collide with everything; obstacles with links only. A geom that a user adds with MuJoCo's default masks (1, 1),
 # such as a floor, collides with links and not with obstacles.
@@ -39,10 +36,8 @@ def add_visual(parent: Element, part: Part, assets: AssetBook, color: tuple[floa
     rgba = part.body.color
     if rgba is None or rgba[3] == 0:
         rgba = color or (_SURFACE_COLOR if part.shape is None else _OBSTACLE_COLOR)
-    add(
-        parent, "geom", name=f"{part.name}:visual", class_="visual", mesh=assets.visual_name(part.mesh),
-        rgba=numbers(rgba),
-    )  # fmt: skip
+    mesh = assets.visual_name(part.mesh)
+    add(parent, "geom", name=f"{part.name}:visual", class_="visual", mesh=mesh, rgba=numbers(rgba))
 
 
 def add_collision(
@@ -54,21 +49,17 @@ def add_collision(
     masks = _OBSTACLE_MASKS if obstacle else {}
     box = part.analysis.box if primitives else None
     if box is not None:
-        name = f"{part.name}:0"
+        name, size = f"{part.name}:0", numbers(box.half_sizes)
+        place = {"pos": numbers(box.center), "quat": numbers(quaternion_from_matrix(box.rotation))}
         owners[name] = part.name
-        add(
-            parent, "geom", name=name, class_="collision", type="box", size=numbers(box.half_sizes),
-            pos=numbers(box.center), quat=numbers(quaternion_from_matrix(box.rotation)), **masks,
-        )  # fmt: skip
+        add(parent, "geom", name=name, class_="collision", type="box", size=size, **place, **masks)
         return
     assets.use_cells(part.mesh, part.shape)
     for i, piece in enumerate(part.shape.pieces):
         name = f"{part.name}:{i}"
         owners[name] = part.name
-        add(
-            parent, "geom", name=name, class_="collision", mesh=assets.cell_name(part.mesh, i),
-            pos=numbers(piece.center), **masks,
-        )  # fmt: skip
+        mesh, pos = assets.cell_name(part.mesh, i), numbers(piece.center)
+        add(parent, "geom", name=name, class_="collision", mesh=mesh, pos=pos, **masks)
 
 
 # A constant pair of more geoms than this is tested by env2mjcf at load alone: MuJoCo tests every <pair> at each step.

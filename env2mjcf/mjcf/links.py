@@ -1,4 +1,4 @@
-"""Bodies: obstacles beside each other in the world, links nested along the chain."""
+"""Bodies: obstacles beside each other in the world, links nested along the chain, which must not be too long."""
 
 from __future__ import annotations
 
@@ -6,16 +6,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
 from ..kinematics.space import ConfigurationSpace, children_first_to_last
 from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
-from ..kinematics.tree import DofKind
+from ..kinematics.tree import DofKind, build_tree
+from ..model.environment import Environment
 from ..options import Options
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
 from .joints import add_base_joints, add_connection_joints
-from .writer import Element, add, numbers, tidy
+from .markup import Element, add, numbers, tidy
+
+# MuJoCo's XML parser refuses the 500th element within others: <mujoco> and <worldbody> are around the bodies, and
+# geoms in the last.
+_MOST_LINKS = 496
 
 
 @dataclass(slots=True)
@@ -37,6 +43,29 @@ class Compilation:
     assets: AssetBook = field(default_factory=AssetBook)
     owners: dict[str, str] = field(default_factory=dict[str, str])
     elements: dict[str, Element] = field(default_factory=dict[str, Element])
+
+
+def refuse_long_chains(environment: Environment, log: DiagnosticLog) -> None:
+    """Make sure that MuJoCo's parser reads the bodies of each chain, which are nested.
+
+    Raises:
+        ConversionError: A link has too many others before it.
+        KinematicsError: The bodies of a robot do not hang together.
+    """
+    for robot in environment.robots:
+        # The readers have said already what is doubtful about it.
+        tree = build_tree(robot, DiagnosticLog())
+        depth: dict[int, int] = {}
+        for body in tree.order:
+            k = tree.parent[body]
+            depth[body] = 1 if k is None else depth[robot.connections[k].previous] + 1
+            if k is not None and depth[body] > _MOST_LINKS:
+                message = (
+                    f"this connection leads to link {depth[body]} of a chain; MuJoCo's XML parser reads at most "
+                    f"{_MOST_LINKS} bodies within each other"
+                )
+                hint = "make the chain shorter, or a robot of its own of a part"
+                log.fail("MJC403", robot.bodies[body].filename, message, hint=hint, span=robot.connections[k].span)
 
 
 def add_obstacles(world: Element, compilation: Compilation) -> None:
@@ -90,22 +119,15 @@ def _has_slides(robot: RobotParts, body: int) -> bool:
 def _add_geoms(
     place: Element, part: Part, compilation: Compilation, *, obstacle: bool, color: tuple[float, ...] | None = None
 ) -> None:
-    add_visual(place, part, compilation.assets, color)
-    add_collision(
-        place,
-        part,
-        compilation.assets,
-        obstacle=obstacle,
-        primitives=compilation.options.primitives,
-        owners=compilation.owners,
-    )
+    assets, owners, primitives = compilation.assets, compilation.owners, compilation.options.primitives
+    add_visual(place, part, assets, color)
+    add_collision(place, part, assets, obstacle=obstacle, primitives=primitives, owners=owners)
 
 
 def _add_inertial(element: Element, inertial: Inertial) -> None:
-    add(
-        element, "inertial", pos=numbers(tidy(inertial.com)), quat=numbers(tidy(inertial.quat)),
-        mass=numbers(inertial.mass), diaginertia=numbers(inertial.diagonal),
-    )  # fmt: skip
+    pos, quat = numbers(tidy(inertial.com)), numbers(tidy(inertial.quat))
+    mass, diagonal = numbers(inertial.mass), numbers(inertial.diagonal)
+    add(element, "inertial", pos=pos, quat=quat, mass=mass, diaginertia=diagonal)
 
 
 def _place(pose: Array) -> dict[str, str]:

@@ -10,7 +10,7 @@ from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind
 from ..model.environment import JointType
 from .links import Compilation
-from .writer import Element, add, numbers, tidy
+from .markup import Element, add, numbers, tidy
 
 # A loop counts as closed at home below this fraction of the scene's extent.
 _CLOSED = 1e-6

@@ -1,7 +1,4 @@
-"""All that surrounds the bodies: options, defaults, light, camera, ground and boundary.
-
-MERGED: The boundary of a scene: wires to look at, or walls.
-"""
+"""All that surrounds the bodies: options, defaults, light, camera, ground, and the boundary as wires or walls."""
 
 from __future__ import annotations
 
@@ -14,9 +11,9 @@ from ..geometry.assembly import Assembly, Part
 from ..kinematics.transforms import Array
 from ..model.environment import Boundary
 from ..options import Options
-from .writer import Element, add, comment, number, numbers
+from .joints import STANDARD_GRAVITY
+from .markup import Element, add, comment, number, numbers
 
-_STANDARD_GRAVITY = 9.80665
 OVERVIEW = (0.55, -1.0, 0.75)
 """Where the camera `overview` stands, seen from the scene: in front, to the right and above."""
 
@@ -28,7 +25,7 @@ def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
     spin fast, and gained energy at twice that step.
     """
     thickness = min((_thickness(p) for r in assembly.robots for p in r.links), default=1.0)
-    g = math.hypot(*gravity) or _STANDARD_GRAVITY
+    g = math.hypot(*gravity) or STANDARD_GRAVITY
     step = math.sqrt(2 * thickness / g) / 70
     return min(max(float(f"{step:.0e}"), 1e-4), 2e-3)
 
@@ -77,18 +74,16 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
 
 def add_sky(asset: Element) -> None:
     """Append the sky behind the scene."""
-    add(
-        asset, "texture", name="sky", type="skybox", builtin="gradient", rgb1="0.93 0.95 0.97", rgb2="0.72 0.80 0.88",
-        width="256", height="1536",
-    )  # fmt: skip
+    size = {"width": "256", "height": "1536"}
+    colors = {"rgb1": "0.93 0.95 0.97", "rgb2": "0.72 0.80 0.88"}
+    add(asset, "texture", name="sky", type="skybox", builtin="gradient", **colors, **size)
 
 
 def add_ground_material(asset: Element) -> None:
     """Append the checkered material of the ground."""
-    add(
-        asset, "texture", name="ground", type="2d", builtin="checker", rgb1="0.86 0.87 0.88", rgb2="0.78 0.80 0.82",
-        width="256", height="256",
-    )  # fmt: skip
+    size = {"width": "256", "height": "256"}
+    colors = {"rgb1": "0.86 0.87 0.88", "rgb2": "0.78 0.80 0.82"}
+    add(asset, "texture", name="ground", type="2d", builtin="checker", **colors, **size)
     add(asset, "material", name="ground", texture="ground", texrepeat="8 8", reflectance="0.05")
 
 
@@ -96,18 +91,14 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
     """Append light, camera, and on request ground and boundary."""
     center, extent = (assembly.lower + assembly.upper) / 2, assembly.extent
     above = center + np.array([0, 0, extent])
-    add(
-        world, "light", name="sun", type="directional", pos=numbers(above), dir="-0.3 0.4 -1",
-        diffuse="0.5 0.5 0.5", specular="0.1 0.1 0.1",
-    )  # fmt: skip
+    light = {"dir": "-0.3 0.4 -1", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}
+    add(world, "light", name="sun", type="directional", pos=numbers(above), **light)
     add(world, "camera", name="overview", **_camera(center, extent))
     if options.ground:
         # Slightly below the lowest point, so that nothing starts in contact with it.
-        height = assembly.lower[2] - 1e-3 * extent
-        add(
-            world, "geom", name="ground", type="plane", material="ground",
-            pos=numbers((center[0], center[1], height)), size=numbers((extent, extent, extent / 20)),
-        )  # fmt: skip
+        pos = numbers((center[0], center[1], assembly.lower[2] - 1e-3 * extent))
+        size = numbers((extent, extent, extent / 20))
+        add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size)
     boundary = assembly.environment.boundary
     if boundary is not None and options.boundary == "visual":
         add_wires(world, boundary, assembly)
@@ -152,10 +143,8 @@ def add_wires(world: Element, boundary: Boundary, assembly: Assembly) -> None:
     lines = boundary_lines(boundary, assembly)
     radius = 5e-4 * max(assembly.extent, *(float(np.linalg.norm(b - a)) for a, b in lines))
     for i, (a, b) in enumerate(lines):
-        add(
-            world, "geom", name=f"boundary:{i}", class_="visual", type="capsule",
-            fromto=numbers((a, b)), size=number(radius), rgba=_WIRE_COLOR,
-        )  # fmt: skip
+        line = {"fromto": numbers((a, b)), "size": number(radius), "rgba": _WIRE_COLOR}
+        add(world, "geom", name=f"boundary:{i}", class_="visual", type="capsule", **line)
 
 
 def _rings(boundary: Boundary, segments: int = 48) -> list[tuple[Array, Array]]:
@@ -187,11 +176,10 @@ def add_walls(world: Element, boundary: Boundary, assembly: Assembly) -> None:
         center = np.zeros(3)
         center[:dimension] = boundary.center
         planes = [(center - boundary.radius * n, n) for n in _directions(dimension)]
+    size = numbers((assembly.extent, assembly.extent, assembly.extent / 20))
     for i, (point, normal) in enumerate(planes):
-        add(
-            world, "geom", name=f"boundary:{i}", type="plane", group="4", pos=numbers(point), zaxis=numbers(normal),
-            size=numbers((assembly.extent, assembly.extent, assembly.extent / 20)), rgba="0.5 0.5 0.5 0.1",
-        )  # fmt: skip
+        plane = {"pos": numbers(point), "zaxis": numbers(normal), "size": size, "rgba": "0.5 0.5 0.5 0.1"}
+        add(world, "geom", name=f"boundary:{i}", type="plane", group="4", **plane)
 
 
 def _directions(dimension: int) -> list[Array]:

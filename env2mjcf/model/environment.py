@@ -317,16 +317,16 @@ class Environment:
 
     name: str
     dialect: Dialect
-    multibodies: tuple[MultiBody, ...]
-    boundary: Boundary | None = None
-    resolution: Resolution = Resolution()
-    tasks: tuple[Task, ...] = ()
+    multibodies: tuple[MultiBody, ...] = field(repr=False)
+    boundary: Boundary | None = field(default=None, repr=False)
+    resolution: Resolution = field(default=Resolution(), repr=False)
+    tasks: tuple[Task, ...] = field(default=(), repr=False)
     semantics: str = "planner"
     declared_multibodies: int | None = None
-    attributes: tuple[tuple[str, str], ...] = ()
-    planner_rules: PlannerRules = PlannerRules()
+    attributes: tuple[tuple[str, str], ...] = field(default=(), repr=False)
+    planner_rules: PlannerRules = field(default=PlannerRules(), repr=False)
     comments: tuple[Comment, ...] = field(default=(), compare=False, repr=False)
-    directory: Path = field(default=Path(), compare=False)
+    directory: Path = field(default=Path(), compare=False, repr=False)
     path: str = field(default="", compare=False)
     sources: tuple[str, ...] = field(default=(), compare=False, repr=False)
     diagnostics: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)

@@ -1,7 +1,4 @@
-"""Files that appear whole or not at all.
-
-MERGED: Opens files that somebody else has made, or may have put something else in the place of.
-"""
+"""The one way to write files, whole or not at all, and to open files that may be pipes, devices or somebody else's."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, NoReturn
 
 from ..diagnostics import DiagnosticLog
 from ..options import PathArgument
@@ -22,6 +19,7 @@ from ..options import PathArgument
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # Of a file, as much as tells what it is.
 _BEGINNING = 4096
+_ANOTHER = "choose another output, or remove the file"
 
 
 @contextmanager
@@ -32,34 +30,31 @@ def replaced(file: str | os.PathLike[str]) -> Generator[Path]:
         The path to write to; it ends as the file does.
 
     Raises:
-        OSError: It cannot be written, or something stands there that is no regular file, such as a device.
+        OSError: It cannot be written, or what stands there is not a regular file but a device, say.
     """
     path = Path(os.fsdecode(file))
     _refuse_special(path)
-    beside = _beside(path)
+    staged = beside(path)
     try:
-        yield beside
-        os.replace(beside, path)
+        yield staged
+        os.replace(staged, path)
     except BaseException:
         # What went wrong is worth more than what this would say.
         with suppress(OSError):
-            beside.unlink()
+            staged.unlink()
         raise
+
+
+def beside(path: Path) -> Path:
+    """Return a new hidden name in the same folder, in front of the same suffix, for a file until it is whole."""
+    return path.with_name(f".{path.stem}-{secrets.token_hex(8)}{path.suffix}")
 
 
 @contextmanager
 def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
-    """Let a file be written as `replaced` does, and say what the system has against it.
-
-    Args:
-        file: The file to write.
-        code: The code of the diagnostic.
-
-    Raises:
-        ConversionError: It cannot be written.
-    """
-    with _said(file, code), replaced(file) as beside:
-        yield beside
+    """Let a file be written as `replaced` does; where it cannot be, fail with a ConversionError of this code."""
+    with _said(file, code), replaced(file) as staged:
+        yield staged
 
 
 def write_together(contents: Mapping[Path, bytes], code: str) -> None:
@@ -76,7 +71,7 @@ def write_together(contents: Mapping[Path, bytes], code: str) -> None:
     Raises:
         ConversionError: A file cannot be written.
     """
-    replacements = {path: _Replacement(path, _beside(path), _beside(path)) for path in contents}
+    replacements = {path: _Replacement(path, beside(path), beside(path)) for path in contents}
     try:
         for path, data in contents.items():
             with _said(path, code):
@@ -93,7 +88,7 @@ def write_together(contents: Mapping[Path, bytes], code: str) -> None:
     try:
         _remove(copies)
     except BaseException:
-        _remove(copies)  # an interrupt waits for it
+        _remove(copies)  # also where an interrupt comes
         raise
 
 
@@ -145,11 +140,7 @@ def _refuse_special(path: Path) -> None:
         raise OSError(errno.EINVAL, "its name holds a NUL character", str(path))
     # Renaming would put a file in the place of /dev/null.
     if path.exists() and not path.is_file():
-        raise OSError(errno.EINVAL, "it is no regular file", str(path))
-
-
-def _beside(path: Path) -> Path:
-    return path.with_name(f".{secrets.token_hex(8)}-{path.name}")
+        raise OSError(errno.EINVAL, "it is not a regular file", str(path))
 
 
 @contextmanager
@@ -170,11 +161,11 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
     Args:
         out: The file to write.
         code: The code of the diagnostic.
-        inputs: Files that are read for it, those that are not there, too.
+        inputs: Files that are read for it, whether they are there or not.
 
     Raises:
-        ConversionError: It is a folder, one of the inputs, or lies in no folder, or in one that may not be written, or
-            no file can have its name.
+        ConversionError: It is a folder or one of the inputs, its folder is missing or may not be written, or no file
+            can have its name.
     """
     path = Path(os.fsdecode(out))
     if reason := _against_name(path):
@@ -184,9 +175,9 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
     elif path.exists() and any(os.path.exists(i) and os.path.samefile(path, i) for i in inputs):
         what = "is an input"
     elif path.exists() and not path.is_file():
-        what = "is no regular file"
+        what = "is not a regular file"
     elif not path.parent.is_dir():
-        what = f"lies in {path.parent}, which is no folder"
+        what = f"lies in {path.parent}, which is not a folder"
     elif not os.access(path.parent, os.W_OK):
         what = f"lies in {path.parent}, which may not be written"
     else:
@@ -207,38 +198,45 @@ def _against_name(path: Path) -> str:
     return ""
 
 
-def refuse_foreign(out: Path, code: str, kind: str, belongs: Callable[[bytes], bool]) -> None:
+def refuse_foreign(
+    out: Path, code: str, kind: str, belongs: Callable[[bytes], bool], size: int = _BEGINNING, hint: str = _ANOTHER
+) -> None:
     """Refuse to replace a file that is of another kind than what is written, such as a scene that was named by mistake.
 
     Args:
         out: The file to write.
         code: The code of the diagnostic.
-        kind: What is written, as "path file".
+        kind: What is written, as "a path file".
         belongs: Says of the beginning of a file whether it is of that kind; nobody misses one of white space only.
+        size: Bytes that tell what it is; -1 for all.
+        hint: What to do about it.
 
     Raises:
         ConversionError: It is of another kind, or cannot be read.
     """
-    if not out.is_file():
+    if not out.exists():
         return
     try:
-        with out.open("rb") as file:
-            beginning = file.read(_BEGINNING)
-    except OSError:
-        what = "cannot be read"
-    else:
-        if not beginning.strip() or belongs(beginning):
-            return
-        what = f"is no {kind}"
-    hint = "choose another output, or remove the file"
-    DiagnosticLog().fail(code, str(out), f"{out} {what}, and is not replaced", hint=hint)
+        with open_regular(out) as file:
+            beginning = file.read(size)
+    except (IsADirectoryError, NoRegularFileError):
+        refuse_replacement(out, code, f"is not {kind}", hint)
+    except OSError as error:
+        refuse_replacement(out, code, f"cannot be read: {error.strerror or error}", hint)
+    if beginning.strip() and not belongs(beginning):
+        refuse_replacement(out, code, f"is not {kind}", hint)
+
+
+def refuse_replacement(out: Path, code: str, why: str, hint: str = _ANOTHER) -> NoReturn:
+    """Fail because a file, for a reason such as "is not a path file", is kept."""
+    DiagnosticLog().fail(code, str(out), f"{out} {why}, and is not replaced", hint=hint)
 
 
 class NoRegularFileError(OSError):
     """A pipe, a socket or a device where a file was expected: it may keep its reader waiting for ever."""
 
     def __init__(self, path: PathArgument) -> None:
-        super().__init__(errno.EINVAL, "it is no regular file but a pipe, a socket or a device", os.fspath(path))
+        super().__init__(errno.EINVAL, "it is not a regular file but a pipe, a socket or a device", os.fspath(path))
 
 
 def open_regular(path: PathArgument) -> IO[bytes]:
@@ -249,8 +247,8 @@ def open_regular(path: PathArgument) -> IO[bytes]:
         OSError: It is a folder, or cannot be opened.
         ValueError: There is a NUL character in its name.
     """
-    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115  who asks closes it
-    # Asked of what is open: whatever bears the name by now may be another.
+    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115  the caller closes it
+    # Asked of what is open: the name may mean another file by now.
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
         raise NoRegularFileError(path)

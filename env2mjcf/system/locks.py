@@ -1,14 +1,8 @@
-"""Locks on open files and folders that end with the process that holds them, however it ends.
+"""Locks between processes, threads and forks, and an end of the interpreter that waits for compiled code.
 
-MERGED: Locks and lasting properties for objects that threads share, and that processes may be forked with at any time.
-
-A forked child has the thread alone that forked it. A lock that another thread held at that moment stays locked there,
-and nobody will ever open it.
-
-
-MERGED: Lets the interpreter end while daemon threads ask: it waits for the rows that they are at, and not for all of them.
-
-Compiled code that is at work while the interpreter takes itself apart crashes the process.
+A lock on an open file or folder ends with the process that holds it, however that ends. A forked child has only the
+thread that forked it: a lock of Python that another thread held at that moment stays locked there for ever. Compiled
+code that is at work while the interpreter takes itself apart crashes the process.
 """
 
 from __future__ import annotations
@@ -28,6 +22,7 @@ from weakref import WeakSet
 
 # Nobody needs more than a moment; a process that is stopped in that moment is not waited for forever.
 PATIENCE = 60.0
+# Seconds between two looks at a lock, or at what is still at work.
 _PAUSE = 0.005
 
 
@@ -44,7 +39,7 @@ class LockOutcome(Enum):
 
 
 def try_lock(handle: int) -> LockOutcome:
-    """Lock an open file or folder for whoever opened it, without waiting; closing it, or a death, unlocks it.
+    """Lock an open file or folder without waiting; closing it, or the end of the process, unlocks it.
 
     Windows cannot lock folders, and some network file systems cannot lock anything.
     """
@@ -161,13 +156,11 @@ class lasting(Generic[T]):
 # Without a lock, which a fork might find taken; each step on a set is one of the interpreter's.
 _at_work: set[threading.Thread] = set()
 _ended = threading.Event()
-# Seconds between two looks at who is still at work.
-_LOOK = 0.005
 
 
 @contextmanager
 def working() -> Generator[None]:
-    """Keep the interpreter from ending meanwhile; a daemon thread that comes when it does goes no further."""
+    """Keep the interpreter from ending meanwhile; it stops a daemon thread that begins when it is already ending."""
     this = threading.current_thread()
     _at_work.add(this)
     try:
@@ -183,4 +176,4 @@ def working() -> Generator[None]:
 def _end() -> None:
     _ended.set()
     while any(thread.is_alive() and thread.daemon for thread in tuple(_at_work)):
-        time.sleep(_LOOK)
+        time.sleep(_PAUSE)

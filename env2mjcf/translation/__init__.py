@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from .outputs import Written as Written
 from .outputs import write_environment as write_environment
-from .scene_parts import DofMap as DofMap
-from .translating import Translation as Translation
-from .translating import translate as translate
+from .robots import DofMap as DofMap
+from .translator import Translation as Translation
+from .translator import translate as translate

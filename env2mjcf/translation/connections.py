@@ -1,8 +1,6 @@
-"""Connections in another dialect: joint types, limits, units.
+"""Connections in another dialect: joint types, limits, units, DH form, and poses as six numbers that a file can hold.
 
-MERGED: Connections in the other DH form: the same pose for every value of the joint (docs/format/kinematics.md).
-
-MERGED: Poses as six numbers that a file can hold.
+In the other DH form a connection has the same pose for every value of its joint; docs/format/kinematics.md has both.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from ..formats.writers import settled, written_limits
 from ..kinematics.transforms import Array, dh_matrix, inverse, pose_matrix
 from ..model.dialects import RULES
 from ..model.environment import Connection, DHForm, DHParameters, Dialect, JointLimits, JointType, MultiBody, Pose
-from .losses import Losses
+from .scene_parts import Losses
 
 
 def connections(robot: MultiBody, losses: Losses) -> tuple[Connection, ...]:
@@ -43,22 +41,14 @@ def _judge_joint(connection: Connection, losses: Losses) -> None:
     if joint in losses.rules.joints:
         return
     if joint is JointType.PRISMATIC:
-        losses.lost(
-            "ENV166",
-            joint.value,
+        message = (
             f"the original planner of dialect {dialect} knows no Prismatic joints; written all "
-            "the same, and read as a slide by env2mjcf",
-            "",
-            connection.span,
+            "the same, and read as a slide by env2mjcf"
         )
+        losses.lost("ENV166", joint.value, message, span=connection.span)
         return
-    losses.refuse(
-        "ENV165",
-        joint.value,
-        f"dialect {dialect} has no {joint.value} joints",
-        "choose another dialect",
-        connection.span,
-    )
+    message = f"dialect {dialect} has no {joint.value} joints"
+    losses.refuse("ENV165", joint.value, message, hint="choose another dialect", span=connection.span)
 
 
 def _limits(connection: Connection, losses: Losses) -> tuple[JointLimits, ...]:
@@ -67,14 +57,11 @@ def _limits(connection: Connection, losses: Losses) -> tuple[JointLimits, ...]:
     turn = JointLimits(-math.pi, math.pi)
     narrow = next((x for x in connection.limits if x != turn), None)
     if narrow is not None:
-        losses.lost(
-            "ENV163",
-            connection.joint.value,
+        message = (
             f"dialect {losses.dialect} has no limits of joints; {narrow.lower:.6g} to {narrow.upper:.6g} "
-            f"{'' if connection.joint is JointType.PRISMATIC else 'rad '}is lost",
-            "",
-            narrow.span or connection.span,
+            f"{'' if connection.joint is JointType.PRISMATIC else 'rad '}is lost"
         )
+        losses.lost("ENV163", connection.joint.value, message, span=narrow.span or connection.span)
     return ()
 
 
@@ -83,14 +70,12 @@ def _report_periodic(robot: MultiBody, losses: Losses) -> None:
         return
     hinge = next((c for c in robot.connections if c.joint is JointType.REVOLUTE), None)
     if hinge is not None:
-        losses.lost(
-            "ENV164",
-            robot.bodies[hinge.next].filename,
+        message = (
             f"hinges turn without end in dialect {robot.dialect}; in dialect {losses.dialect} they go from half a turn "
-            "back to half a turn on, and not past it",
-            "every pose is still reached",
-            hinge.span,
+            "back to half a turn on, and not past it"
         )
+        hint = "every pose is still reached"
+        losses.lost("ENV164", robot.bodies[hinge.next].filename, message, hint=hint, span=hinge.span)
 
 
 # Half a turn about x + z: what turned about x turns about z behind it, and the other way round.

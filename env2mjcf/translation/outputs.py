@@ -1,9 +1,4 @@
-"""Files of a translation, and what they do not replace.
-
-MERGED: Environments on the disk: the env file, robot files and a query beside it.
-
-MERGED: Mesh files, named as they are found from another folder.
-"""
+"""Environments on the disk: the env file, robots and a query beside it, meshes named as they are found from there."""
 
 from __future__ import annotations
 
@@ -12,7 +7,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import NoReturn
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic, Env2MjcfError
@@ -27,15 +21,15 @@ from ..limits import Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Environment, MultiBody
 from ..options import Options, PathArgument
-from ..system.files import refuse_unwritable, write_together
+from ..system.files import refuse_replacement, refuse_unwritable, write_together
 
 
 class Kind(StrEnum):
     """What a file of a translation is."""
 
-    ENVIRONMENT = "env file"
-    ROBOT = "robot file"
-    QUERY = "query"
+    ENVIRONMENT = "an env file"
+    ROBOT = "a robot file"
+    QUERY = "a query"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +48,12 @@ _READERS: dict[Kind, Callable[[Source, DiagnosticLog], object]] = {
 }
 
 
-def refuse_no_translation(environment: Output, companions: Sequence[Output]) -> None:
-    """Refuse to replace what is no older translation.
+def refuse_foreign_outputs(environment: Output, companions: Sequence[Output]) -> None:
+    """Refuse to replace what is not an older translation.
 
-    The env file has been named, and may be replaced if it begins as one. Its companions have not: they must read as
-    what they are without a warning, beside an older env file. What is empty, or says the same, may always be replaced.
+    The caller has named the env file, which may be replaced if it begins as one. Its companions were not named: they
+    must read as what they are without a warning, beside an older env file. What is empty, or says the same, may always
+    be replaced.
 
     Raises:
         ConversionError: Something else stands where a file would be written.
@@ -70,9 +65,9 @@ def refuse_no_translation(environment: Output, companions: Sequence[Output]) -> 
         if old is not None and old.text.strip() in ("", output.text.strip()):
             continue
         if old is None or not _reads_as(output.kind, old):
-            _refuse(output, f"is no {output.kind}")
+            refuse_replacement(output.path, "ENV190", f"is not {output.kind}")
         if not environment.path.exists():
-            _refuse(output, f"is there without {environment.path}")
+            refuse_replacement(output.path, "ENV190", f"is there without {environment.path}")
 
 
 def _read(path: Path) -> Source | None:
@@ -89,11 +84,6 @@ def _reads_as(kind: Kind, source: Source) -> bool:
         return False
 
 
-def _refuse(output: Output, why: str) -> NoReturn:
-    hint = "name another output, or remove the file"
-    DiagnosticLog().fail("ENV190", str(output.path), f"{output.path} {why}, and is not replaced", hint=hint)
-
-
 @dataclass(frozen=True, slots=True)
 class Written:
     """The files of an environment.
@@ -102,7 +92,7 @@ class Written:
         environment: The env file.
         robots: A file for each robot that has one of its own.
         query: Its tasks; None where there are none.
-        mesh_dirs: Folders outside that of the env file that meshes lie in; who reads it must allow them.
+        mesh_dirs: Folders outside that of the env file that meshes lie in; they must be allowed when it is read.
         notes: What is worth knowing about the files.
     """
 
@@ -150,7 +140,7 @@ def write_environment(
         rows = query_text(environment.tasks, index=begins_with_robot(environment))
         companions.append(Output(query, Kind.QUERY, rows))
     scene = Output(out, Kind.ENVIRONMENT, env_text(placed))
-    refuse_no_translation(scene, companions)
+    refuse_foreign_outputs(scene, companions)
     write_together({o.path: o.text.encode("utf-8", "surrogateescape") for o in (*companions, scene)}, "ENV179")
     return Written(out, tuple(names), query, outside, tuple(log))
 
@@ -178,7 +168,7 @@ def named_from(
     """
     found, problems = find_all(environment, options, log)
     for name, problem in problems.items():
-        # What the scene may not read is there all the same; who reads what is written has to allow it.
+        # What the scene may not read is there all the same; it must be allowed when the new file is read.
         if problem.path is not None:
             found[name] = problem.path
             continue
@@ -189,7 +179,7 @@ def named_from(
     for body in (b for m in environment.multibodies for b in m.bodies):
         name = names[body.filename] = _name_from(here, body.filename, found.get(body.filename))
         if len(name.split()) != 1:
-            message = f"the file name {name!r} is no single word, as names in text files are"
+            message = f"the file name {name!r} is not a single word, as names in text files are"
             hint = "write the environment into another folder, or rename the file"
             log.fail("ENV178", body.filename, message, hint=hint, span=body.span)
         if body.filename in found:

@@ -1,21 +1,23 @@
-"""Robots, obstacles and surfaces in another dialect.
-
-MERGED: Bodies in another dialect.
-"""
+"""Robots, obstacles, their bodies, and configurations of robots in another dialect."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
 from ..kinematics.forward import RobotKinematics
-from ..kinematics.tree import build_tree
+from ..kinematics.transforms import Array, wrap
+from ..kinematics.tree import Dof, DofKind, build_tree
 from ..model.dialects import RULES, SurfaceLabels
-from ..model.environment import BaseKind, Body, MultiBody, MultiBodyKind, Pose, Recentring
-from .connections import connections, six_numbers
-from .losses import Losses
+from ..model.environment import BaseKind, Body, MultiBody, MultiBodyKind, Pose, Recentring, Task
+from .connections import connections, six_numbers, swaps_angles
+from .scene_parts import Losses
 
 
 def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) -> MultiBody:
@@ -35,20 +37,17 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
         _report_fixed_base(source, losses)
     _report_bases(source, losses)
     if source.adjacencies and not losses.rules.adjacencies:
-        losses.lost(
-            "ENV172",
-            "Adjacencies",
+        message = (
             f"dialect {losses.dialect} has no adjacencies; these {len(source.adjacencies)} "
-            "are lost, so that those links are tested",
-            "exclude them with exclude_pairs",
-            source.span,
+            "are lost, so that those links are tested"
         )
+        losses.lost("ENV172", "Adjacencies", message, hint="exclude them with exclude_pairs", span=source.span)
     if source.actuators:
-        losses.lost("ENV177", "<Actuator>", "text files have no actuators; they are lost", "", source.actuators[0].span)
+        message = "text files have no actuators; they are lost"
+        losses.lost("ENV177", "<Actuator>", message, span=source.actuators[0].span)
     if source.label is not None:
-        losses.lost(
-            "ENV177", source.label, f"text files have no labels of robots; {source.label!r} is lost", "", source.span
-        )
+        message = f"text files have no labels of robots; {source.label!r} is lost"
+        losses.lost("ENV177", source.label, message, span=source.span)
     return replace(
         source,
         bodies=_bodies(source, losses),
@@ -74,7 +73,7 @@ def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody
         pose = body.pose if fixed and body.pose is not None else six_numbers(matrix)
         yield replace(
             source,
-            bodies=(static_body(body, pose, losses),),
+            bodies=(_static_body(body, pose, losses),),
             connections=(),
             dialect=losses.dialect,
             dh_form=losses.rules.dh_form,
@@ -86,7 +85,7 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
     if source.dialect is losses.dialect and losses.rules.legacy_layout:
         return source.bodies
     bases = build_tree(source, DiagnosticLog()).bases
-    bodies = [robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
+    bodies = [_robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
     if losses.rules.legacy_layout:
         fixed = [b.base is BaseKind.FIXED for b in bodies]
         bodies = [replace(b, index=fixed[:i].count(fixed[i])) for i, b in enumerate(bodies)]
@@ -102,7 +101,7 @@ def _label(source: MultiBody, losses: Losses) -> str | None:
     if labels is not SurfaceLabels.NONE:
         return source.label
     if source.label is not None:
-        losses.lost("ENV170", source.label, f"dialect {losses.dialect} has no labels of surfaces", "", source.span)
+        losses.lost("ENV170", source.label, f"dialect {losses.dialect} has no labels of surfaces", span=source.span)
     return None
 
 
@@ -110,27 +109,19 @@ def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
     if source.kind in losses.rules.kinds or source.kind is MultiBodyKind.ACTIVE:
         return source if source.moves else replace(source, kind=MultiBodyKind.ACTIVE)
     if source.kind is MultiBodyKind.NON_HOLONOMIC:
-        losses.lost(
-            "ENV173",
-            "NonHolonomic",
+        message = (
             f"dialect {losses.dialect} has no NonHolonomic robots; written as Active, "
-            "without controls and velocity bounds",
-            "",
-            source.span,
+            "without controls and velocity bounds"
         )
+        losses.lost("ENV173", "NonHolonomic", message, span=source.span)
     return replace(source, kind=MultiBodyKind.ACTIVE, velocity_bounds=None, controls=())
 
 
 def _report_bases(source: MultiBody, losses: Losses) -> None:
     bases = [b for b in source.bodies if b.base is not BaseKind.JOINT]
     if losses.rules.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
-        losses.lost(
-            "ENV176",
-            bases[1].filename,
-            f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one",
-            "split the robot",
-            bases[1].span,
-        )
+        message = f"a robot with {len(bases)} bases; the planner of dialect {losses.dialect} takes one"
+        losses.lost("ENV176", bases[1].filename, message, hint="split the robot", span=bases[1].span)
 
 
 def _report_fixed_base(source: MultiBody, losses: Losses) -> None:
@@ -138,20 +129,17 @@ def _report_fixed_base(source: MultiBody, losses: Losses) -> None:
     fixed = next((b for b in source.bodies if b.base is BaseKind.FIXED), None)
     if before != after and fixed is not None:
         change = "is tested" if after else "is not tested"
-        losses.lost(
-            "ENV175",
-            fixed.filename,
+        message = (
             f"the fixed base {fixed.filename} {change} against obstacles in dialect "
-            f"{losses.dialect}, unlike in dialect {source.dialect}",
-            "",
-            fixed.span,
+            f"{losses.dialect}, unlike in dialect {source.dialect}"
         )
+        losses.lost("ENV175", fixed.filename, message, span=fixed.span)
 
 
 _WORD = re.compile(r"[^\s#]\S*")
 
 
-def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
+def _robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     """Return one body of a robot.
 
     Args:
@@ -167,19 +155,16 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
     # Dialect A's first FreeBody is a free base, every other one a link.
     free = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     if base not in (free, BaseKind.FIXED):
-        losses.refuse(
-            "ENV167",
-            body.filename,
+        message = (
             f"a {base.value} base of {body.filename}; in dialect A the first body moves "
-            "freely or is fixed, and all others hang on connections or are fixed",
-            "choose another dialect",
-            body.span,
+            "freely or is fixed, and all others hang on connections or are fixed"
         )
+        losses.refuse("ENV167", body.filename, message, hint="choose another dialect", span=body.span)
     # A free base has a pose there, its home; other dialects' free bases are at home at the origin.
     return replace(dressed, base=base, pose=body.pose or Pose() if first or base is BaseKind.FIXED else None)
 
 
-def static_body(body: Body, pose: Pose, losses: Losses) -> Body:
+def _static_body(body: Body, pose: Pose, losses: Losses) -> Body:
     """Return the body of an obstacle or a surface."""
     dressed = _dressed(body, losses)
     return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.rules.legacy_layout else None)
@@ -189,29 +174,21 @@ def _dressed(body: Body, losses: Losses) -> Body:
     """Return a body without the options that the dialect does not have."""
     name, span, dialect = body.filename, body.span, losses.dialect
     if not _WORD.fullmatch(name):
-        losses.refuse(
-            "ENV178",
-            name,
-            f"the file name {name!r} is no single word, as names in text files are",
-            "rename the mesh file",
-            span,
-        )
+        message = f"the file name {name!r} is not a single word, as names in text files are"
+        losses.refuse("ENV178", name, message, hint="rename the mesh file", span=span)
     if body.mass is not None and not losses.rules.mass:
-        losses.lost(
-            "ENV170", name, f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost", "", span
-        )
+        message = f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost"
+        losses.lost("ENV170", name, message, span=span)
         body = replace(body, mass=None)
     if losses.rules.options:
         return body
     if body.recentring is not Recentring.COM:
-        losses.refuse(
-            "ENV169",
-            name,
+        message = (
             f"{name} is not to be moved to the mean of its vertices ({body.recentring.value}); dialect "
-            f"{dialect} always does",
-            "move the mean of its vertices into the origin, or choose dialect D or E",
-            span,
+            f"{dialect} always does"
         )
+        hint = "move the mean of its vertices into the origin, or choose dialect D or E"
+        losses.refuse("ENV169", name, message, hint=hint, span=span)
     return _without_paint(body, losses)
 
 
@@ -219,12 +196,12 @@ def _without_paint(body: Body, losses: Losses) -> Body:
     """Keep as much of a colour as the visualiser's comment holds."""
     name, color = body.filename, body.color
     if body.texture is not None:
-        losses.lost("ENV170", name, f"dialect {losses.dialect} has no textures; {body.texture} is lost", "", body.span)
+        losses.lost("ENV170", name, f"dialect {losses.dialect} has no textures; {body.texture} is lost", span=body.span)
     if color is not None and not all(0 <= c <= 1 for c in color):
-        losses.lost("ENV170", name, "a colour beyond 0 to 1 cannot be written as a comment; it is lost", "", body.span)
+        losses.lost("ENV170", name, "a colour beyond 0 to 1 cannot be written as a comment; it is lost", span=body.span)
         color = None
     if color is not None and color[3] != 1:
-        losses.lost("ENV170", name, f"dialect {losses.dialect} has opaque colours only", "", body.span)
+        losses.lost("ENV170", name, f"dialect {losses.dialect} has opaque colours only", span=body.span)
         color = (*color[:3], 1.0)
     return replace(body, texture=None, color=color)
 
@@ -232,10 +209,70 @@ def _without_paint(body: Body, losses: Losses) -> Body:
 def _report_home(body: Body, base: BaseKind, losses: Losses) -> None:
     if base in (BaseKind.FIXED, BaseKind.JOINT) or body.pose is None or body.pose == Pose():
         return
-    losses.lost(
-        "ENV168",
-        body.filename,
-        f"dialect {losses.dialect} has no pose for a free base: {body.filename} is at home at the origin there",
-        "a query file holds where the robot starts",
-        body.pose.span or body.span,
-    )
+    message = f"dialect {losses.dialect} has no pose for a free base: {body.filename} is at home at the origin there"
+    hint = "a query file holds where the robot starts"
+    losses.lost("ENV168", body.filename, message, hint=hint, span=body.pose.span or body.span)
+
+
+_OTHER = {DofKind.THETA: DofKind.ALPHA, DofKind.ALPHA: DofKind.THETA}
+
+
+@dataclass(frozen=True, slots=True)
+class DofMap:
+    """From a robot's configurations to those of its translation.
+
+    Attributes:
+        source, target: The robot before and after.
+        order: For each degree of freedom of the target, which one of the source it is.
+    """
+
+    source: RobotKinematics = field(repr=False)
+    target: RobotKinematics = field(repr=False)
+    order: tuple[int, ...]
+
+    @classmethod
+    def of(cls, source: MultiBody, target: MultiBody) -> DofMap:
+        """Pair the degrees of freedom of a robot and its translation."""
+        before, after = RobotKinematics.of(source), RobotKinematics.of(target)
+        places = {(d.connection, d.body, d.kind): i for i, d in enumerate(before.dofs)}
+        return cls(before, after, tuple(places[_key(d, source, target)] for d in after.dofs))
+
+    def q(self, q: ArrayLike) -> Array:
+        """Turn configurations (..., dim), in radians and lengths, into those of the target.
+
+        Angles that turned without end and now have limits are reduced by whole turns.
+        """
+        values = np.array(q, dtype=np.float64)[..., list(self.order)]
+        for i, (dof, old) in enumerate(zip(self.target.dofs, self.order, strict=True)):
+            if self.source.dofs[old].periodic and not dof.periodic:
+                values[..., i] = wrap(values[..., i])
+        return values
+
+    def numbers(self, configuration: Sequence[float]) -> tuple[float, ...]:
+        """Turn one configuration from the source's own numbers into the target's."""
+        before, after = (RULES[k.multibody.dialect].configuration_angle for k in (self.source, self.target))
+        ratio, half_turn = before / after, math.pi / after
+        found: list[float] = []
+        for dof, old in zip(self.target.dofs, self.order, strict=True):
+            value = float(configuration[old])
+            if not dof.kind.is_length:
+                value *= ratio
+                # Turns go from 0 to 1, and pi units from -1 to 1.
+                if ratio > 1 and self.source.dofs[old].periodic:
+                    value -= 2 * half_turn * math.floor(value / (2 * half_turn) + 0.5)
+                    # 1.8 - 2 is not quite -0.2.
+                    near = round(value, 12)
+                    value = near if abs(near - value) < 4e-16 else value
+            found.append(value)
+        return tuple(found)
+
+    def task(self, task: Task) -> Task:
+        """Turn a task's configurations into the target's numbers."""
+        return Task(task.robot, tuple(self.numbers(c) for c in task.configurations), task.label, task.span)
+
+
+def _key(dof: Dof, source: MultiBody, target: MultiBody) -> tuple[int | None, int, DofKind]:
+    if dof.connection is None:
+        return None, dof.body, dof.kind
+    swapped = swaps_angles(source.connections[dof.connection], source.dh_form, target.dh_form)
+    return dof.connection, dof.body, _OTHER[dof.kind] if swapped else dof.kind

@@ -83,7 +83,7 @@ class TestForeignFiles:
     def test_an_output_that_is_no_array_is_kept(self, scene, capsys, output) -> None:
         saved(scene, 10)
         Path("notes.txt").write_text("mine")
-        assert "no NumPy file, and is not replaced" in refused(capsys, "q.npy", "-o", output)
+        assert "not a NumPy file, and is not replaced" in refused(capsys, "q.npy", "-o", output)
 
     def test_an_array_or_an_empty_file_is_replaced(self, scene) -> None:
         saved(scene, 10)

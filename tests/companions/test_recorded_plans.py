@@ -9,7 +9,7 @@ import pytest
 
 import env2mjcf
 from env2mjcf import Roadmap, Scene
-from env2mjcf.companions.local_planners import ways_between
+from env2mjcf.companions.roadmaps import ways_between
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.simulation.edge_verdicts import Edges, EdgeVerdicts
 

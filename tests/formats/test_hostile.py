@@ -18,7 +18,7 @@ import pytest
 from scenes import fault
 
 import env2mjcf
-from env2mjcf.companions.arrays import open_source
+from env2mjcf.companions.arrays import open_rows
 from env2mjcf.companions.configurations import of_file
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.errors import Env2MjcfError
@@ -488,7 +488,7 @@ def checked(scene: env2mjcf.Scene, path: str) -> np.ndarray:
 
 
 def batched(scene: env2mjcf.Scene, path: str) -> np.ndarray:
-    source = open_source(path, scene.space, True)
+    source = open_rows(path, scene.space, True)
     return source.decoded(source.raw(0, len(source)), 0)
 
 

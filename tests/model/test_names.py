@@ -24,7 +24,7 @@ from scenes import box_mesh
 import env2mjcf
 from env2mjcf import ConversionError, FormatError, GeometryError, Roadmap
 from env2mjcf.cli.main import main
-from env2mjcf.mjcf.writer import comment_text
+from env2mjcf.mjcf.markup import comment_text
 from env2mjcf.model.names import file_stem, mesh_stem
 from env2mjcf.view.web import page as wording
 

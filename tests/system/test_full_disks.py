@@ -199,8 +199,8 @@ def test_what_is_no_file_is_not_replaced_by_one(
     """A pipe stands for devices such as /dev/null, which renaming would replace just so."""
     monkeypatch.setitem(VERBS, verb, (VERBS[verb][0], "pipe", VERBS[verb][2]))
     os.mkfifo(tmp_path / "pipe")
-    judged(run(verb, inputs, tmp_path), verb, "is no regular file")
-    with pytest.raises(OSError, match="no regular file"), replaced(tmp_path / "pipe") as beside:
+    judged(run(verb, inputs, tmp_path), verb, "is not a regular file")
+    with pytest.raises(OSError, match="not a regular file"), replaced(tmp_path / "pipe") as beside:
         beside.write_text("")
     assert (tmp_path / "pipe").is_fifo()
     assert [p.name for p in tmp_path.iterdir()] == ["pipe"]
@@ -210,7 +210,7 @@ def test_what_is_no_file_is_not_replaced_by_one(
 def test_a_plan_does_not_replace_what_is_no_path(inputs: Path, tmp_path: Path) -> None:
     for name, text in (("b.path", "my notes\n"), ("b.approach.path", "my other notes\n"), ("b.path", "\0\1\2")):
         (tmp_path / name).write_text(text)
-        judged((*run("plan", inputs, tmp_path)[:3], "CFG553"), "plan", "is no path file, and is not replaced")
+        judged((*run("plan", inputs, tmp_path)[:3], "CFG553"), "plan", "is not a path file, and is not replaced")
         assert (tmp_path / name).read_text() == text
         (tmp_path / name).unlink()
     for text in ("", OLD.decode()):

@@ -58,7 +58,7 @@ def test_a_pipe_that_a_problem_names_is_refused(name: str, tmp_path: Path) -> No
     status, said = run("info", folder / "maze.xml")
     assert status == 3
     assert "ENV104" in said
-    assert "no regular file" in said
+    assert "not a regular file" in said
     assert f"{name}" in said.splitlines()[1]  # the line of the problem that names it
 
 
@@ -70,7 +70,7 @@ def test_lint_waits_for_no_pipe(name: str, tmp_path: Path) -> None:
     status, said = run("lint", tmp_path / name, tmp_path)
     assert status == 1
     assert ("GEO204" if name == "b.g" else "ENV104") in said
-    assert "no regular file" in said
+    assert "not a regular file" in said
     assert "2 files" in said
 
 
@@ -78,7 +78,7 @@ def test_a_file_of_configurations_is_no_pipe(tmp_path: Path) -> None:
     scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
     os.mkfifo(tmp_path / "q.npy")
     status, said = run("check", scene, tmp_path / "q.npy")
-    assert (status, "no regular file" in said) == (3, True)
+    assert (status, "not a regular file" in said) == (3, True)
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_pipes_in_the_folder_that_is_written_to_are_not_waited_for(tmp_path: Pat
     status, said = run("batch", scene, tmp_path / "q.npy", "-o", out / "v.npy")
     assert status == 3
     assert "CFG509" in said
-    assert "v.npy.journal is no regular file" in said
+    assert "v.npy.journal is not a regular file" in said
 
 
 @pytest.mark.slow

@@ -266,7 +266,7 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     shown = run(verb, "scene.env", *rest, *out, folder=tmp_path)
     assert (shown.returncode, shown.stdout) == (3, "")
     assert "error CFG552: none/a." in shown.stderr
-    assert "lies in none, which is no folder" in shown.stderr
+    assert "lies in none, which is not a folder" in shown.stderr
 
 
 @pytest.mark.slow

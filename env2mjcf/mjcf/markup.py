@@ -1,18 +1,26 @@
-"""Writes MJCF text that is the same on every run: two-space indent, attributes in the order given."""
+"""MJCF as text: written the same on every run, and known again after somebody has edited it."""
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from ..formats.source import wide_encoding
 from ..kinematics.transforms import Array
 
 Element = Any  # lxml's classes have no public names
+
+# Without going back, which would take for ever in a file of many comments.
+_MJCF = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>]*>)*+<mujoco(?=[\s/>])", re.DOTALL)
+_ENDINGS = (".stl", ".obj", ".xml", ".mjcf", ".urdf")
+_FILE = re.compile(r"""(?<![^\s"'<>=])[^\s"'<>=]+\.(?:stl|obj|xml|mjcf|urdf)""", re.IGNORECASE)
 
 
 def number(value: float) -> str:
@@ -60,6 +68,30 @@ def comment_text(lines: Iterable[str], indent: str = "") -> str:
 
 
 def to_text(root: Element) -> str:
-    """Return the whole document, with a final newline."""
+    """Return the whole document, with a final newline: two-space indent, attributes in the order given."""
     etree.indent(root, space="  ")
     return etree.tostring(root, encoding="unicode") + "\n"
+
+
+def is_mjcf(data: bytes) -> bool:
+    """Return whether a text is MJCF, whatever its encoding, and whatever comments stand above it."""
+    return _MJCF.match(_decoded(data)) is not None
+
+
+def files_mentioned(data: bytes) -> set[str]:
+    """Return what looks like the name of a file in a text in MJCF: values of attributes, and words anywhere.
+
+    A comment may keep a line for later, and MuJoCo reads texts that are not well-formed.
+    """
+    names = set(_FILE.findall(html.unescape(_decoded(data))))
+    with suppress(etree.XMLSyntaxError):
+        root: Element = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True))
+        values = (value for element in root.iter(etree.Element) for value in element.attrib.values())
+        names.update(value for value in values if value.lower().endswith(_ENDINGS))
+    return names
+
+
+def _decoded(data: bytes) -> str:
+    wide = wide_encoding(data)
+    little = data[:1] != b"\0" and not data.startswith(b"\xfe")
+    return data.decode(f"{wide}-{'le' if little else 'be'}" if wide else "utf-8", "replace").lstrip("\ufeff")

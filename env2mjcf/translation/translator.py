@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic
 from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules
-from . import scene_parts as bounds
-from .losses import Losses
-from .robots import translate_obstacles, translate_robot
-from .scene_parts import DofMap
+from .robots import DofMap, translate_obstacles, translate_robot
+from .scene_parts import Losses, translated_boundary, translated_resolution
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +24,7 @@ class Translation:
     """
 
     environment: Environment
-    notes: tuple[Diagnostic, ...]
+    notes: tuple[Diagnostic, ...] = field(repr=False)
     robots: tuple[DofMap, ...]
 
 
@@ -51,7 +49,8 @@ def translate(
     """
     log = DiagnosticLog(strict)
     losses = Losses(Dialect(dialect), log)
-    robots = _Robots(environment, losses)
+    robots = _robots(environment, losses)
+    maps = tuple(DofMap.of(a, b) for a, b in zip(environment.robots, robots, strict=True))
     found = _multibodies(environment, robots, losses)
     _report_xml(environment, losses)
     if environment.boundary is None and boundary is not None:
@@ -61,35 +60,25 @@ def translate(
         environment,
         dialect=losses.dialect,
         multibodies=found,
-        boundary=bounds.boundary(environment, losses),
-        resolution=bounds.resolution(environment, losses),
-        tasks=tuple(robots.maps[t.robot].task(t) for t in environment.tasks),
+        boundary=translated_boundary(environment, losses),
+        resolution=translated_resolution(environment, losses),
+        tasks=tuple(maps[t.robot].task(t) for t in environment.tasks),
         semantics="planner",
         declared_multibodies=written,
         attributes=(),
         planner_rules=PlannerRules(),
         diagnostics=tuple(log),
     )
-    return Translation(result, tuple(log), robots.maps)
+    return Translation(result, tuple(log), maps)
 
 
-class _Robots:
-    """The robots of a scene and their translations."""
-
-    def __init__(self, environment: Environment, losses: Losses) -> None:
-        sources = environment.robots
-        meets = bool(environment.obstacles)
-        files = _files(environment.name, sources) if losses.rules.robot_files else [None] * len(sources)
-        self.translated = tuple(
-            replace(translate_robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
-        )
-        self.maps = tuple(DofMap.of(a, b) for a, b in zip(sources, self.translated, strict=True))
-        self._by_id = {id(s): t for s, t in zip(sources, self.translated, strict=True)}
-        _report_number(environment, losses)
-
-    def get(self, source: MultiBody) -> MultiBody | None:
-        """Return the translation of a robot; None where the multibody is none."""
-        return self._by_id.get(id(source))
+def _robots(environment: Environment, losses: Losses) -> tuple[MultiBody, ...]:
+    """Return the translation of each robot."""
+    sources, meets = environment.robots, bool(environment.obstacles)
+    files = _files(environment.name, sources) if losses.rules.robot_files else [None] * len(sources)
+    robots = [translate_robot(r, meets, losses) for r in sources]
+    _report_number(environment, losses)
+    return tuple(replace(r, robot_file=f) for r, f in zip(robots, files, strict=True))
 
 
 def _files(name: str, robots: Sequence[MultiBody]) -> list[str]:
@@ -104,10 +93,11 @@ def _kept(robot: MultiBody) -> str | None:
     return file if file is not None and PurePath(file).suffix.lower() != ".xml" else None
 
 
-def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> tuple[MultiBody, ...]:
+def _multibodies(environment: Environment, robots: Sequence[MultiBody], losses: Losses) -> tuple[MultiBody, ...]:
     found: list[MultiBody] = []
+    translated = {id(s): r for s, r in zip(environment.robots, robots, strict=True)}
     for source in environment.multibodies:
-        robot = robots.get(source)
+        robot = translated.get(id(source))
         if robot is not None:
             found.append(robot)
         elif source.kind in losses.rules.kinds:
@@ -125,17 +115,11 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
 def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
     name, dialect = source.label or source.bodies[0].filename, losses.dialect
     if not losses.rules.legacy_layout:
-        losses.lost(
-            "ENV174", name, f"dialect {dialect} has no surfaces; {name}, which only is drawn, is lost", "", source.span
-        )
+        message = f"dialect {dialect} has no surfaces; {name}, which is only drawn, is lost"
+        losses.lost("ENV174", name, message, span=source.span)
         return []
-    losses.lost(
-        "ENV174",
-        name,
-        f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an obstacle",
-        "",
-        source.span,
-    )
+    message = f"dialect {dialect} has no surfaces: {name} is written as one, and its planner takes it for an obstacle"
+    losses.lost("ENV174", name, message, span=source.span)
     return list(translate_obstacles(source, losses))
 
 
@@ -144,18 +128,12 @@ def _report_number(environment: Environment, losses: Losses) -> None:
         return
     robots = environment.robots
     if not robots and environment.multibodies:
-        message = "add a robot, with robots=[...] (--robots) if it has a file of its own"
-        losses.refuse(
-            "ENV176", environment.name, "a scene without robot: dialect A takes its first multibody for one", message
-        )
+        hint = "add a robot, with robots=[...] (--robots) if it has a file of its own"
+        what = "a scene without a robot: dialect A takes its first multibody for one"
+        losses.refuse("ENV176", environment.name, what, hint=hint)
     if len(robots) > 1:
-        losses.lost(
-            "ENV176",
-            environment.name,
-            f"{len(robots)} robots; the planner of dialect A moves the first only, and takes the others for obstacles",
-            "",
-            robots[1].span,
-        )
+        message = f"{len(robots)} robots; the planner of dialect A moves the first, and takes the others for obstacles"
+        losses.lost("ENV176", environment.name, message, span=robots[1].span)
 
 
 def _report_xml(environment: Environment, losses: Losses) -> None:
@@ -165,9 +143,5 @@ def _report_xml(environment: Environment, losses: Losses) -> None:
     rules = environment.planner_rules
     # One link apart is the default.
     if rules.ignore_self_collision or rules.adjacent_links not in (None, 1):
-        losses.lost(
-            "ENV177",
-            environment.name,
-            "text files do not say which pairs of links are tested; what the problem file says about that is lost",
-            "choose with adjacent_links and self_collision",
-        )
+        message = "text files do not say which pairs of links are tested; what the problem file says about that is lost"
+        losses.lost("ENV177", environment.name, message, hint="choose with adjacent_links and self_collision")
