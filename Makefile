@@ -41,6 +41,7 @@ tables: $(VENV)/dev.stamp  ## make the tables of README.md, benchmarks/ and docs
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python docs/diagnostics.py
 	$(BIN)/python docs/figures/connection.py
+	$(BIN)/python docs/figures/architecture.py
 
 pictures: $(VENV)/dev.stamp  ## draw the pictures in docs/ anew
 	$(BIN)/python models/demo.py --gallery docs/models.png

@@ -97,6 +97,11 @@ def test_the_picture_of_a_connection_is_what_its_script_draws() -> None:
     assert done.returncode == 0, "run `make tables`"
 
 
+def test_the_picture_of_the_rooms_shows_their_imports() -> None:
+    done = subprocess.run([sys.executable, DOCS / "figures" / "architecture.py", "--check"], check=False)
+    assert done.returncode == 0, "run `make tables`"
+
+
 def test_the_page_of_diagnostics_lists_every_code() -> None:
     done = subprocess.run([sys.executable, DOCS / "diagnostics.py", "--check"], check=False)
     assert done.returncode == 0, "run `make tables`"
