@@ -54,6 +54,8 @@ html_theme_options = {"top_of_page_buttons": []}
 PAGES = {
     "README.md": "/index.md",
     "CHANGELOG.md": "/changelog.md",
+    "CONTRIBUTING.md": "/contributing.md",
+    "SECURITY.md": "/security.md",
     "benchmarks/RESULTS.md": "/benchmarks/results.md",
     "benchmarks/corpus.md": "/benchmarks/corpus.md",
     "benchmarks/speed.md": "/benchmarks/speed.md",

@@ -133,3 +133,31 @@ def test_an_example_that_differs_is_found(page: str, complaint: str, tmp_path: P
     with pytest.raises(pytest.fail.Exception) as failure:
         follow(tmp_path / "page.md", tmp_path)
     assert complaint in str(failure.value)
+
+
+ARCHITECTURE = DOCS / "architecture.md"
+PACKAGE = ROOT / "env2mjcf"
+
+
+def test_the_page_on_architecture_names_what_is_there() -> None:
+    text = ARCHITECTURE.read_text(encoding="utf-8")
+    paths = {p for p in re.findall(r"`([\w/]+\.pyi?)`", text) if "/" in p and not p.startswith(("tests/", "models/"))}
+    gone = sorted(p for p in paths if not (PACKAGE / p.removeprefix("env2mjcf/")).is_file())
+    assert gone == []
+    for row in re.findall(r"^\| [^|]+ \| (`[^|]+`) \| (`[^|]+`) \| .+ \|$", text, re.MULTILINE):
+        code = "".join((PACKAGE / p).read_text(encoding="utf-8") for p in re.findall(r"`([\w/.]+)`", row[0]))
+        for name in re.findall(r"`(\w+)`", row[1]):
+            assert re.search(rf"^(?:def|class) {name}\b", code, re.MULTILINE), f"{row[0]} has no {name}"
+
+
+def test_modules_of_unusual_size_have_a_reason() -> None:
+    table = ARCHITECTURE.read_text(encoding="utf-8").split("\n## Sizes\n")[1]
+    explained = {p for row in re.findall(r"^\| (`.+?`) \|", table, re.MULTILINE) for p in re.findall(r"`(.+?)`", row)}
+    modules = [p for p in PACKAGE.rglob("*.py") if p.name != "__init__.py"]
+    sizes = {p.relative_to(PACKAGE).as_posix(): len(p.read_text(encoding="utf-8").splitlines()) for p in modules}
+    assert {p for p, lines in sizes.items() if not 80 <= lines <= 350} == explained
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.search(rf"^version: {re.escape(env2mjcf.__version__)}$", citation, re.MULTILINE)
