@@ -22,19 +22,19 @@ GROUPS = {
 }
 # A room's floor follows from its imports. Its place on that floor, its colour and a word about it are chosen.
 ROOMS = {
-    "errors": (0.5, "said", "exceptions, findings, places"),
-    "diagnostics": (0.0, "said", "code, class, meaning; the log"),
+    "errors": (0.5, "said", "exceptions and findings"),
+    "diagnostics": (0.0, "said", "codes, meanings, the log"),
     "model": (1.0, "file", "a scene as dataclasses"),
     "limits": (0.0, "said", "bounds on input and work"),
     "options": (0.0, "said", "what a user may choose"),
     "system": (0.0, "said", "files, locks, imports"),
     "kinematics": (0.5, "file", "frames, joints, q and qpos"),
-    "formats": (0.5, "file", "text, XML, meshes; read, written"),
+    "formats": (0.5, "file", "text, XML and meshes"),
     "pairs": (1.55, "file", "which bodies are tested"),
     "summary": (-0.6, "file", "a scene in words"),
-    "geometry": (0.5, "mujoco", "mend, cut into cells, certify"),
+    "geometry": (0.5, "mujoco", "mended, cut into cells"),
     "translation": (0.0, "use", "one dialect to another"),
-    "mjcf": (1.0, "mujoco", "bodies, joints, geoms; the folder"),
+    "mjcf": (1.0, "mujoco", "bodies, joints, geoms"),
     "pipeline": (1.0, "mujoco", "the whole way, once"),
     "report": (1.5, "mujoco", "what came of it"),
     "contact": (0.5, "scene", "verdicts, distances, edges"),
@@ -59,15 +59,15 @@ RESULTS = {
     "pipeline": "Compiled: all of these",
     "simulation": "Scene",
 }
-WIDE, HIGH, COLUMN, FLOOR = 214, 48, 232, 82
+WIDE, HIGH, COLUMN, FLOOR = 214, 54, 232, 88
 LEFT, TOP, WIDTH = 262, 66, 1080
 TITLE = "The rooms of env2mjcf, the highest first"
 STYLE = """
-text { font-family: Helvetica, Arial, sans-serif; font-size: 12.5px; fill: #4b5563; text-anchor: middle }
-.room { font-size: 15px; font-weight: bold; fill: #111827 }
-.result { font-size: 14px; fill: #c2410c; text-anchor: start }
-.title { font-size: 19px; font-weight: bold; fill: #111827; text-anchor: start }
-.left { text-anchor: start; font-size: 13.5px }
+text { font-family: Helvetica, Arial, sans-serif; font-size: 15px; fill: #4b5563; text-anchor: middle }
+.room { font-size: 18px; font-weight: bold; fill: #111827 }
+.result { font-size: 16.5px; fill: #c2410c; text-anchor: start }
+.title { font-size: 23px; font-weight: bold; fill: #111827; text-anchor: start }
+.left { text-anchor: start; font-size: 16px }
 .import { fill: none; stroke: #6b7280; stroke-width: 1.4 } .way { stroke: #c2410c; stroke-width: 2 }
 """
 
@@ -148,8 +148,8 @@ def picture() -> str:
         _, fill, edge = GROUPS[group]
         box = f'x="{x - WIDE / 2:.0f}" y="{y:.0f}" width="{WIDE}" height="{HIGH}" rx="9"'
         lines.append(f'<rect {box} fill="{fill}" stroke="{edge}"/>')
-        lines.append(f'<text x="{x:.0f}" y="{y + 20:.0f}" class="room">{room}</text>')
-        lines.append(f'<text x="{x:.0f}" y="{y + 38:.0f}">{words}</text>')
+        lines.append(f'<text x="{x:.0f}" y="{y + 23:.0f}" class="room">{room}</text>')
+        lines.append(f'<text x="{x:.0f}" y="{y + 43:.0f}">{words}</text>')
     height = TOP + highest * FLOOR + HIGH + 24
     size = f'viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}"'
     markers = "".join(
@@ -195,7 +195,7 @@ def curve(x1: float, y1: float, x2: float, y2: float) -> str:
 
 def handed_on(heights: dict[str, float]) -> list[str]:
     """Return what becomes of a scene, from its files at the bottom to the top."""
-    x, lowest, highest = 800, max(heights.values()), min(heights.values())
+    x, lowest, highest = 790, max(heights.values()), min(heights.values())
     lines = [
         f'<path d="M{x} {lowest + FLOOR - 14:.0f} V{highest - 20:.0f}" class="way" marker-end="url(#result)"/>',
         f'<text x="{x + 16}" y="{lowest + FLOOR - 16:.0f}" class="left">the text of the files, and meshes</text>',
@@ -209,12 +209,12 @@ def handed_on(heights: dict[str, float]) -> list[str]:
 
 def legend(height: int) -> list[str]:
     """Return what colours and arrows mean."""
-    x, y = 720, height - 262
+    x, y = 690, height - 286
     lines: list[str] = []
     for n, (words, fill, edge) in enumerate(reversed(GROUPS.values())):
         lines.append(
-            f'<rect x="{x}" y="{y + 25 * n}" width="26" height="16" rx="4" fill="{fill}" stroke="{edge}"/>'
-            f'<text x="{x + 36}" y="{y + 25 * n + 13}" class="left">{words}</text>'
+            f'<rect x="{x}" y="{y + 28 * n}" width="26" height="16" rx="4" fill="{fill}" stroke="{edge}"/>'
+            f'<text x="{x + 36}" y="{y + 28 * n + 13}" class="left">{words}</text>'
         )
     for n, words in enumerate(
         (
@@ -223,7 +223,7 @@ def legend(height: int) -> list[str]:
             "every room may use all that its arrows lead to.",
         )
     ):
-        lines.append(f'<text x="{x}" y="{y + 178 + 19 * n}" class="left">{words}</text>')
+        lines.append(f'<text x="{x}" y="{y + 200 + 22 * n}" class="left">{words}</text>')
     return lines
 
 
