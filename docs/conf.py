@@ -100,8 +100,13 @@ def on_docstring(app: Sphinx, what: str, name: str, obj: object, options: object
 
 
 def on_fields(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Keep docutils from taking the name of a type that ends in an underscore for a link."""
+    """Keep docutils from taking for links, or for bold, what is neither.
+
+    Names of types that end in an underscore, endings of files such as `.xml`, and keyword arguments (`**options`).
+    """
     lines[:] = [re.sub(r"\bnp\.bool_(?=\W|$)", "bool", line) if ":vartype" in line else line for line in lines]
+    lines[:] = [re.sub(r"(?<!`)`(\.\w+)`(?!`)", r"``\1``", line) for line in lines]
+    lines[:] = [re.sub(r"(?<!\S)\*\*(?=\w+ )(?!.*\*\*)", r"\\*\\*", line) for line in lines]
 
 
 def setup(app: Sphinx) -> None:
