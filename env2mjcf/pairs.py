@@ -1,4 +1,4 @@
-"""Which pairs of bodies are tested against each other (design: section 6)."""
+"""Which pairs of bodies are tested against each other."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def rigid_groups(robot: RobotKinematics) -> list[int]:
 
 
 def _tests_static(robot: RobotKinematics, body: int) -> bool:
-    """Dialect A never tests a robot's FixedBody (env-format section 11)."""
+    """Dialect A never tests a robot's FixedBody against obstacles; later dialects test a fixed base."""
     return RULES[robot.multibody.dialect].tests_fixed_base or robot.multibody.bodies[body].base is not BaseKind.FIXED
 
 

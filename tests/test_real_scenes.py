@@ -147,7 +147,7 @@ def test_aligned_links_that_cross_deeply_collide(corpus: Path) -> None:
 def test_what_the_planner_recorded_as_free_is_free(
     corpus: Path, name: str, files: dict[str, int], collision: str
 ) -> None:
-    """Nodes on the surface of the walls, and paths (env-format section 15); nodes of roadmaps."""
+    """Nodes on the surface of the walls, and paths (docs/format/readings.md); nodes of roadmaps."""
     scene = load(name, collision=collision)
     for file, count in files.items():
         read = env2mjcf.read_roadmap if file.endswith(".map") else env2mjcf.read_path

@@ -13,8 +13,8 @@ from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic
 from ..formats import path as text
 from ..formats.source import Source, read_source
-from ..kinematics.inverse import configuration_of_poses, pose_gaps
-from ..kinematics.transforms import Array, rotation_matrix, transform
+from ..kinematics.forward import configuration_of_poses
+from ..kinematics.transforms import Array, pose_gaps, rotation_matrix, transform
 from ..limits import Limits
 from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument

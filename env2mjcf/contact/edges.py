@@ -211,7 +211,7 @@ class MotionBounds:
         """Return how far each degree of freedom goes, (n, dim), those of a base taken together.
 
         The translations of a base make one straight line. Its angular velocity is at most the root of
-        (|rx'| + |rz'|)^2 + ry'^2, since the axis of ry is square to the two others (env-format section 9.2).
+        (|rx'| + |rz'|)^2 + ry'^2, since the axis of ry is square to the two others (R = Rz Ry Rx).
         """
         turns = np.abs(delta)
         for columns in self._bases:

@@ -22,7 +22,7 @@ from .types import Contact
 _MOST = 8
 # Contacts nearer than this, in sizes of the smaller body, whose normals are within about 18 degrees, are one.
 _NEAR, _ALIKE = 0.05, 0.95
-# Cells and triangles may differ by the band of verdicts (design: section 6), in extents.
+# Cells and triangles may differ by the band of verdicts, in extents.
 _BAND = 1e-5
 _BLOCK = 4096
 

@@ -27,7 +27,7 @@ from .mujoco_engine import MujocoEngine, static_contacts
 from .surfaces import Surfaces
 from .types import Contact, PackedContacts
 
-# Bodies nearer than this, in extents, may touch by the verdicts (design: section 6).
+# Bodies nearer than this, in extents, may touch by the verdicts.
 _BAND = 1e-5
 
 

@@ -1,77 +1,44 @@
-"""The blocks that several dialects share: poses, DH rows, ranges, colours, counted lists.
-
-MERGED: The `Boundary` of dialects C to E, in text and XML (env-format sections 6 to 8).
-"""
+"""Blocks that several dialects share, in text and XML: poses, DH rows, colours, ranges, boundaries, counted lists."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from ..errors import Span
 from ..limits import LARGEST, Limits
-from ..model.dialects import RULES, DialectRules
-from ..model.environment import (
-    Body,
-    Boundary,
-    BoundaryShape,
-    Comment,
-    DHForm,
-    DHParameters,
-    Dialect,
-    MultiBodyKind,
-    Pose,
-)
+from ..model.dialects import DialectRules
+from ..model.environment import Body, Boundary, BoundaryShape, Comment, DHParameters, MultiBodyKind, Pose
 from .lexer import Scanner, parse_number
 
 T = TypeVar("T")
 
-# An angle beyond two turns is hardly one in radians: it is taken for one in degrees.
+# An angle beyond two turns was probably meant in degrees.
 _SUSPICIOUS_RADIANS = 4 * math.pi
 
 _MULTIBODY_TAGS = {"multibody", *(k.value.lower() for k in MultiBodyKind)}
 
-
-@dataclass(frozen=True, slots=True)
-class Grammar:
-    """A dialect's rules as one file is read with them.
-
-    Attributes:
-        dialect: The dialect.
-        rules: Its table, with the changes that `semantics` makes.
-    """
-
-    dialect: Dialect
-    rules: DialectRules
-
-    @classmethod
-    def of(cls, dialect: Dialect, semantics: str = "planner") -> Grammar:
-        """Look the dialect up; `page` swaps dialect A's two transforms and takes textbook DH (design: section 4)."""
-        rules = RULES[dialect]
-        if semantics == "page" and dialect is Dialect.A:
-            swapped = ("actuated", "to_dh", "dh", "joint", "to_body")
-            rules = replace(rules, connection_fields=swapped, dh_form=DHForm.STANDARD)
-        return cls(dialect, rules)
+SHAPES = {s.value: s for s in BoundaryShape}
 
 
-def read_pose(scan: Scanner, grammar: Grammar) -> Pose:
+def read_pose(scan: Scanner, rules: DialectRules) -> Pose:
     """Read `x y z rx ry rz`."""
     start = scan.position
     x, y, z, rx, ry, rz = scan.numbers("x y z rx ry rz")
-    unit = grammar.rules.pose_angle
+    unit = rules.pose_angle
     return Pose((x, y, z), (rx * unit, ry * unit, rz * unit), scan.span(start))
 
 
-def read_dh(scan: Scanner, grammar: Grammar) -> DHParameters:
+def read_dh(scan: Scanner, rules: DialectRules) -> DHParameters:
     """Read `alpha a d theta`."""
     start = scan.position
     alpha, a, d, theta = scan.numbers("alpha a d theta")
     span = scan.span(start)
-    unit = grammar.rules.dh_angle
+    unit = rules.dh_angle
     if unit == 1.0 and max(abs(alpha), abs(theta)) > _SUSPICIOUS_RADIANS:
-        message = f"alpha {alpha:g} and theta {theta:g} are read as radians in dialect {grammar.dialect}"
+        message = f"alpha {alpha:g} and theta {theta:g} are read as radians in dialect {rules.dialect}"
         scan.log.warn("ENV303", "DH parameters", message, hint="only dialect A has degrees here", span=span)
     return DHParameters(alpha * unit, a, d, theta * unit, span)
 
@@ -109,29 +76,43 @@ def read_range(scan: Scanner, what: str) -> tuple[float, float]:
     return lower, upper
 
 
-def read_counted(scan: Scanner, what: str, at_most: int, read: Callable[[], T]) -> tuple[T, ...]:
-    """Read a count and the entries that are really there; each entry begins with a number."""
-    start = scan.position
-    declared = scan.count(f"the number of {_plural(what)}", at_most, "connections")
-    span = scan.span(start)
-    found: list[T] = []
-    while scan.next_is_number():
-        check_limit(scan, len(found) + 1, at_most, what, "connections")
-        found.append(read())
-    check_count(scan, declared, len(found), what, span)
-    return tuple(found)
+def read_counted(
+    scan: Scanner,
+    what: str,
+    limit: str,
+    read: Callable[[int], T],
+    follows: Callable[[bool], bool] | None = None,
+    *,
+    required: bool = False,
+) -> tuple[T, ...]:
+    """Read a count and the entries that are really there; warn where these are two numbers.
 
-
-def check_count(scan: Scanner, declared: int, found: int, what: str, span: Span) -> None:
-    """Warn where a file declares another number of things than it has.
+    Args:
+        scan: Stands in front of the count.
+        what: What an entry is called.
+        limit: The field of `Limits` that bounds them.
+        read: Reads an entry, given how many came before.
+        follows: Whether an entry comes next, given whether one is due; None: each begins with a number.
+        required: Whether one entry is needed.
 
     Raises:
         FormatError: The file ends too early: one that is cut off must not read as another robot.
     """
-    if found < declared and scan.at_end():
-        scan.fail_expected(f"{what} {found + 1} of {declared}")
-    if declared != found:
-        warn_of_count(scan, declared, found, what, span)
+    start = scan.position
+    declared = scan.count(f"the number of {_plural(what)}", limit)
+    span = scan.span(start)
+    found: list[T] = []
+    while follows(len(found) < declared) if follows else scan.next_is_number():
+        check_limit(scan, len(found) + 1, what, limit)
+        found.append(read(len(found)))
+    if len(found) < declared and scan.at_end():
+        scan.fail_expected(f"{what} {len(found) + 1} of {declared}")
+    if declared != len(found):
+        warn_of_count(scan, declared, len(found), what, span)
+    if required and not found:
+        message = f"a multibody without {_plural(what)}; expected one or more"
+        scan.fail("ENV117", message, hint="remove the multibody", span=span)
+    return tuple(found)
 
 
 def warn_of_count(scan: Scanner, declared: int, found: int, what: str, span: Span) -> None:
@@ -141,14 +122,15 @@ def warn_of_count(scan: Scanner, declared: int, found: int, what: str, span: Spa
     scan.log.warn("ENV203", plural, message, hint=f"write {found}", span=span)
 
 
-def check_limit(scan: Scanner, found: int, at_most: int, what: str, limit: str) -> None:
-    """Refuse more things than `limits` allow; `limit` is the name of the field."""
+def check_limit(scan: Scanner, found: int, what: str, limit: str) -> None:
+    """Refuse more things than `Limits` allow in the field `limit`."""
+    at_most = getattr(scan.limits, limit)
     if found > at_most:
         scan.fail("ENV110", f"more than {at_most} {_plural(what)}", hint=Limits.hint(limit))
 
 
 def with_directives(scan: Scanner, body: Body, comments: Sequence[Comment]) -> Body:
-    """Apply `#VIZMO_COLOR` and `#VIZMO_NAME` lines to a body that has no colour of its own (env-format section 3.1)."""
+    """Apply `#VIZMO_COLOR` and `#VIZMO_NAME` lines to a body that has no colour of its own."""
     color, label = None, None
     for comment in comments:
         words = comment.text.split()
@@ -177,15 +159,11 @@ def _plural(what: str) -> str:
     return {"body": "bodies", "multibody": "multibodies", "adjacency": "adjacencies"}.get(what, f"{what}s")
 
 
-SHAPES = {s.value: s for s in BoundaryShape}
-_AXES = "xyz"
-
-
 def read_boundary(scan: Scanner) -> Boundary:
     """Read what follows the word `Boundary`, with or without brackets."""
     start = scan.position
     if scan.peek() == "[":
-        # The newest planner's own writer leaves the word out (env-format section 8.1).
+        # The newest planner's own writer leaves the word out.
         shape = BoundaryShape.BOX
         hint = "write Boundary Box ["
         scan.log.warn("ENV206", "Boundary", "a boundary without a shape; read as Box", hint=hint, span=scan.span())
@@ -211,7 +189,7 @@ def _read_box(scan: Scanner, shape: BoundaryShape, span: Span, brackets: bool) -
     while len(ranges) < 3 and _range_follows(scan, brackets):
         if brackets:
             scan.punctuation(";", "between two ranges")
-        ranges.append(read_range(scan, f"the {_AXES[len(ranges)]} range of the boundary"))
+        ranges.append(read_range(scan, f"the {'xyz'[len(ranges)]} range of the boundary"))
     if len(ranges) < 2:
         hint = "write lower:upper for each axis"
         scan.fail("ENV119", "a box with one range; expected two or three (x, y and perhaps z)", hint=hint, span=span)

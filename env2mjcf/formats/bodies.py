@@ -1,7 +1,4 @@
-"""The bodies of dialects B to E: options, mass, base and pose (env-format sections 5 to 8).
-
-MERGED: Connections: tag, count, joint type, limits (env-format sections 4.1, 5 and 6).
-"""
+"""The bodies of a multibody, with options, mass, base and pose, and the connections between them."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ from dataclasses import replace
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
+from ..model.dialects import DialectRules
 from ..model.environment import (
     BaseKind,
     Body,
@@ -22,60 +20,88 @@ from ..model.environment import (
     Recentring,
     SMAShape,
 )
-from .blocks import Grammar, is_multibody_tag, read_color, read_counted, read_dh, read_pose, read_range, with_directives
+from .blocks import is_multibody_tag, read_color, read_counted, read_dh, read_pose, read_range, with_directives
 from .lexer import Scanner, Token, misspelling
 
+_LEGACY_TAGS = {"FreeBody": True, "FixedBody": False}
 _BASES = {"Planar": "Planar", "Volumetric": "Volumetric", "Fixed": "Fixed", "Joint": "Joint"}
 _MOVEMENTS = {"Rotational": "Rotational", "Translational": "Translational"}
 _ADJUSTMENTS = {r.value.lower(): r for r in Recentring}
 # One letter behind a minus sign: neither a coordinate nor `-nan`.
 _OPTION = re.compile(r"-([A-Za-z])(?![A-Za-z])")
 _OPTION_TEXT = re.compile(r"([^)\r\n]*)(?=\))")
+_LEGACY_JOINTS = {"Revolute": JointType.REVOLUTE, "Prismatic": JointType.PRISMATIC}
+_LATER_JOINTS = {j.value: j for j in JointType}
+_LIMIT_COUNT = {JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}
+_LIMIT_NEXT = re.compile(r"[+-]?[0-9.]\S*\s*:")
+# A hinge between -2 pi and 2 pi is still meant; beyond that the limits are hardly fractions of pi.
+_SUSPICIOUS_LIMIT = 2.0
+_CONNECTION_TAGS = ("Connections", "Connection")
+
+SELF_CONNECTION = "a connection from body {} to itself; expected two bodies"
 
 
-def read_robot_body(scan: Scanner, grammar: Grammar) -> Body:
+def read_legacy_body(scan: Scanner, rules: DialectRules, first: bool) -> Body:
+    """Read dialect A's `FreeBody index file [pose]` or `FixedBody index file pose`; `first` of its multibody or not."""
+    comments = scan.take_directives()
+    # The original takes every word but `FixedBody` for `FreeBody`, and compares its case.
+    free = scan.keyword(_LEGACY_TAGS, "body tag", code="ENV122", exact_case=rules.keyword_case)
+    index = scan.integer("the index of the body")
+    filename = scan.word("a mesh file", whole=True)
+    pose = read_pose(scan, rules) if not free or scan.next_is_number() else None
+    if free and not first and pose is not None:
+        message = "only the first FreeBody of a robot has a pose; this one is not used"
+        scan.log.info("ENV301", filename.text, message, span=pose.span)
+    free_base = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
+    span = scan.source.span(filename.start, filename.end)
+    base = free_base if free else BaseKind.FIXED
+    body = Body(filename.text, base, pose, rules.recentring, index=index, span=span)
+    return with_directives(scan, body, comments)
+
+
+def read_robot_body(scan: Scanner, rules: DialectRules) -> Body:
     """Read `file [options] [mass] base`."""
     comments = scan.take_directives()
-    body = _read_mesh(scan, grammar, scan.word("a mesh file", whole=True))
+    body = _read_mesh(scan, rules, scan.word("a mesh file", whole=True))
     if scan.next_is_number():
         body = replace(body, mass=_read_mass(scan))
-    base, pose = _read_base(scan, grammar)
+    base, pose = _read_base(scan, rules)
     return with_directives(scan, replace(body, base=base, pose=pose), comments)
 
 
-def read_static_body(scan: Scanner, grammar: Grammar) -> Body:
+def read_static_body(scan: Scanner, rules: DialectRules) -> Body:
     """Read `file [options] pose`."""
-    return _with_pose(scan, grammar, scan.word("a mesh file", whole=True))
+    return _with_pose(scan, rules, scan.word("a mesh file", whole=True))
 
 
-def read_surface_body(scan: Scanner, grammar: Grammar) -> tuple[str | None, Body]:
+def read_surface_body(scan: Scanner, rules: DialectRules) -> tuple[str | None, Body]:
     """Read `[label] file [options] pose`."""
     first = scan.word("a label or a mesh file", whole=True)
     # Builds before be353b3d have no label: the file name stands first then.
     if scan.next_is_number() or scan.next_matches(_OPTION):
-        return None, _with_pose(scan, grammar, first)
-    return first.text, read_static_body(scan, grammar)
+        return None, _with_pose(scan, rules, first)
+    return first.text, read_static_body(scan, rules)
 
 
-def _with_pose(scan: Scanner, grammar: Grammar, filename: Token) -> Body:
+def _with_pose(scan: Scanner, rules: DialectRules, filename: Token) -> Body:
     comments = scan.take_directives()
-    body = _read_mesh(scan, grammar, filename)
-    # Dialect E lets an obstacle say `Fixed` before its pose (env-format section 8.1).
+    body = _read_mesh(scan, rules, filename)
+    # Dialect E lets an obstacle say `Fixed` before its pose.
     if misspelling(scan.peek_word(), _BASES) is not None:
         start = scan.position
-        base, pose = _read_base(scan, grammar)
+        base, pose = _read_base(scan, rules)
         if base is not BaseKind.FIXED:
             message = f"an obstacle with a {base.value} base; expected Fixed or a pose"
             scan.fail("ENV123", message, hint="robots have files of their own", span=scan.span(start))
     else:
-        pose = read_pose(scan, grammar)
+        pose = read_pose(scan, rules)
     return with_directives(scan, replace(body, pose=pose), comments)
 
 
-def _read_mesh(scan: Scanner, grammar: Grammar, filename: Token) -> Body:
-    """Read the options behind a file name, in any order; blanks are free (env-format section 7)."""
+def _read_mesh(scan: Scanner, rules: DialectRules, filename: Token) -> Body:
+    """Read the options behind a file name, in any order; blanks are free."""
     span = scan.source.span(filename.start, filename.end)
-    body = Body(filename.text, BaseKind.FIXED, recentring=grammar.rules.recentring, span=span)
+    body = Body(filename.text, BaseKind.FIXED, recentring=rules.recentring, span=span)
     while (option := scan.next_matches(_OPTION)) is not None:
         scan.advance(option.end())
         body = _read_option(scan, body, option.group(1).lower(), option.start())
@@ -116,66 +142,51 @@ def _read_mass(scan: Scanner) -> float:
     return mass
 
 
-def _read_base(scan: Scanner, grammar: Grammar) -> tuple[BaseKind, Pose | None]:
+def _read_base(scan: Scanner, rules: DialectRules) -> tuple[BaseKind, Pose | None]:
     word = scan.keyword(_BASES, "base", code="ENV123")
     if word == "Fixed":
-        return BaseKind.FIXED, read_pose(scan, grammar)
+        return BaseKind.FIXED, read_pose(scan, rules)
     if word == "Joint":
         return BaseKind.JOINT, None
     return BaseKind(f"{word} {scan.keyword(_MOVEMENTS, 'movement', code='ENV123')}"), None
 
 
-# A hinge between -2 pi and 2 pi is still meant; beyond that the limits are hardly fractions of pi.
-_SUSPICIOUS_LIMIT = 2.0
-
-SELF_CONNECTION = "a connection from body {} to itself; expected two bodies"
-
-_LEGACY_JOINTS = {"Revolute": JointType.REVOLUTE, "Prismatic": JointType.PRISMATIC}
-_LATER_JOINTS = {j.value: j for j in JointType}
-_LIMIT_COUNT = {JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}
-_LIMIT_NEXT = re.compile(r"[+-]?[0-9.]\S*\s*:")
-_CONNECTION_TAGS = ("Connections", "Connection")
-
-
-def read_connections(scan: Scanner, grammar: Grammar, bodies: int) -> tuple[Connection, ...]:
+def read_connections(scan: Scanner, rules: DialectRules, bodies: int) -> tuple[Connection, ...]:
     """Read a tag, a count and connections."""
-    _read_connection_tag(scan, grammar)
-    return read_counted(
-        scan, "connection", scan.limits.connections, lambda: read_connection(scan, grammar, bodies)
-    )  # fmt: skip
+    _read_connection_tag(scan, rules)
+    return read_counted(scan, "connection", "connections", lambda _: _read_connection(scan, rules, bodies))
 
 
-def read_connection(scan: Scanner, grammar: Grammar, bodies: int) -> Connection:
-    """Read one connection, its fields in the dialect's order (env-format sections 4.1 and 5)."""
+def _read_connection(scan: Scanner, rules: DialectRules, bodies: int) -> Connection:
+    """Read one connection, its fields in the dialect's order."""
     start = scan.position
     previous = read_body_index(scan, bodies)
     following = read_body_index(scan, bodies)
     span = scan.span(start)
     if previous == following:
-        scan.fail(
-            "ENV116", SELF_CONNECTION.format(previous), hint="a connection leads from a parent to its child", span=span
-        )
+        hint = "a connection leads from a parent to its child"
+        scan.fail("ENV116", SELF_CONNECTION.format(previous), hint=hint, span=span)
     joint, limits, sma, actuated = JointType.REVOLUTE, (), None, None
     poses: dict[str, Pose] = {}
     dh = DHParameters()
-    for name in grammar.rules.connection_fields:
+    for name in rules.connection_fields:
         if name == "actuated":
             actuated = scan.word("a tag such as Actuated").text
         elif name == "joint":
-            joint = _read_joint(scan, grammar)
+            joint = _read_joint(scan, rules)
         elif name == "limits":
-            limits = _read_all_limits(scan, grammar, joint)
+            limits = _read_all_limits(scan, rules, joint)
         elif name == "dh":
-            dh = read_dh(scan, grammar)
+            dh = read_dh(scan, rules)
             if joint is JointType.SMA:
                 sma = SMAShape(*scan.numbers("length width"))
         else:
-            poses[name] = read_pose(scan, grammar)
+            poses[name] = read_pose(scan, rules)
     return Connection(previous, following, joint, poses["to_dh"], dh, poses["to_body"], limits, actuated, sma, span)
 
 
-def read_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> JointLimits:
-    """Read one `lower:upper` of a joint: lengths for a slide, else fractions of pi (env-format section 12)."""
+def read_limits(scan: Scanner, rules: DialectRules, joint: JointType) -> JointLimits:
+    """Read one `lower:upper` of a joint: lengths for a slide, else fractions of pi."""
     start = scan.position
     lower, upper = read_range(scan, "a joint's limits")
     span = scan.span(start)
@@ -184,7 +195,7 @@ def read_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> JointLimit
     if max(abs(lower), abs(upper)) > _SUSPICIOUS_LIMIT:
         message = f"limits {lower:g}:{upper:g} are fractions of pi, here more than a whole turn either way"
         scan.log.warn("ENV305", joint.value, message, hint="write -1:1 for a whole turn", span=span)
-    unit = grammar.rules.configuration_angle
+    unit = rules.configuration_angle
     return JointLimits(lower * unit, upper * unit, span)
 
 
@@ -198,39 +209,38 @@ def read_body_index(scan: Scanner, bodies: int) -> int:
     return index
 
 
-def warn_of_no_limits(log: DiagnosticLog, grammar: Grammar, joint: JointType, span: Span) -> None:
+def warn_of_no_limits(log: DiagnosticLog, rules: DialectRules, joint: JointType, span: Span) -> None:
     """Warn that a joint has no limits in a dialect that demands them."""
     unbounded = joint is JointType.PRISMATIC
     message = (
-        f"{joint.value} without limits in dialect {grammar.dialect}; expected min:max, read as "
+        f"{joint.value} without limits in dialect {rules.dialect}; expected min:max, read as "
         f"{'unbounded' if unbounded else '-1:1'}"
     )
     hint = "write the limits behind the joint type" if unbounded else "write -1:1"
     log.warn("ENV204", joint.value, message, hint=hint, span=span)
 
 
-def _read_connection_tag(scan: Scanner, grammar: Grammar) -> None:
+def _read_connection_tag(scan: Scanner, rules: DialectRules) -> None:
     start = scan.position
     word = scan.peek_word()
     tag = next((t for t in _CONNECTION_TAGS if t.lower() == word.lower()), None) or misspelling(word, _CONNECTION_TAGS)
-    if tag is None and not grammar.rules.plural_connections and word.isalpha() and not is_multibody_tag(word):
+    if tag is None and not rules.plural_connections and word.isalpha() and not is_multibody_tag(word):
         # The readers of A, B and early C take any word here.
         scan.word("a tag")
         message = f"{word!r} stands where 'Connections' was expected"
         scan.log.warn("ENV202", word, message, hint="write Connections", span=scan.span(start))
         return
     tag = scan.keyword({t: t for t in _CONNECTION_TAGS}, "tag")
-    if tag == "Connection" and grammar.rules.plural_connections:
-        message = f"dialect {grammar.dialect} spells this tag 'Connections'"
+    if tag == "Connection" and rules.plural_connections:
+        message = f"dialect {rules.dialect} spells this tag 'Connections'"
         scan.log.warn("ENV205", tag, message, hint="write Connections", span=scan.span(start))
 
 
-def _read_joint(scan: Scanner, grammar: Grammar) -> JointType:
-    legacy = grammar.dialect is Dialect.A
+def _read_joint(scan: Scanner, rules: DialectRules) -> JointType:
+    legacy = rules.dialect is Dialect.A
     start = scan.position
-    joint = scan.keyword(
-        _LEGACY_JOINTS if legacy else _LATER_JOINTS, "joint type", code="ENV121", exact_case=grammar.rules.keyword_case
-    )
+    joints = _LEGACY_JOINTS if legacy else _LATER_JOINTS
+    joint = scan.keyword(joints, "joint type", code="ENV121", exact_case=rules.keyword_case)
     if joint is JointType.PRISMATIC:
         message = (
             "a Prismatic connection slides along the DH z axis, its value replacing d; "
@@ -242,12 +252,12 @@ def _read_joint(scan: Scanner, grammar: Grammar) -> JointType:
     return joint
 
 
-def _read_all_limits(scan: Scanner, grammar: Grammar, joint: JointType) -> tuple[JointLimits, ...]:
+def _read_all_limits(scan: Scanner, rules: DialectRules, joint: JointType) -> tuple[JointLimits, ...]:
     count = _LIMIT_COUNT.get(joint, 0)
     if not count:
         return ()
     if scan.next_matches(_LIMIT_NEXT):
-        return tuple(read_limits(scan, grammar, joint) for _ in range(count))
-    if grammar.dialect is not Dialect.B:
-        warn_of_no_limits(scan.log, grammar, joint, scan.span())
+        return tuple(read_limits(scan, rules, joint) for _ in range(count))
+    if rules.dialect is not Dialect.B:
+        warn_of_no_limits(scan.log, rules, joint, scan.span())
     return ()

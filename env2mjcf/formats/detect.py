@@ -1,4 +1,4 @@
-"""Tells the dialect of an env file from its text (env-format section 2)."""
+"""Tells the dialect of an env file from its text (docs/format/env.md)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
     """Return the dialect of an environment's text.
 
     Raises:
-        FormatError: The text is none of them.
+        FormatError: The text is not in any dialect.
     """
     text = _COMMENT.sub("", source.text)
     first, second = _first_words(text)
@@ -61,7 +61,7 @@ def detect(source: Source, log: DiagnosticLog) -> Dialect:
     else:
         expected = "a number of multibodies, 'Boundary' or XML"
         wrong = first
-    message = f"{source.path} is no environment: found {wrong[:40]!r}; expected {expected}"
+    message = f"{source.path} is not an environment: found {wrong[:40]!r}; expected {expected}"
     hint = "name an environment, or choose its dialect with dialect= (--dialect)"
     log.fail("ENV130", source.path, message, hint=hint, span=_place(source, wrong))
 
@@ -87,7 +87,7 @@ def _with_boundary(text: str) -> Dialect:
     match = _BOUNDARY.match(text)
     if match and not match.group(1):
         return Dialect.C
-    # `-a( Surface )` is no tag.
+    # `-a( Surface )` is not a tag.
     words = set(_TAG_LIKE.findall(_OPTION.sub("", text)))
     return Dialect.D if any(map(_is_robot_tag, words)) else Dialect.E
 

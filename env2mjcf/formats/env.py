@@ -1,7 +1,4 @@
-"""Reads the text of an environment in any of the five dialects.
-
-MERGED: Dialect E robot text files (env-format section 8.2).
-"""
+"""Reads the text of an environment in any of the five dialects, and of dialect E's robot files."""
 
 from __future__ import annotations
 
@@ -10,38 +7,40 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+from ..model.dialects import DialectRules, rules_of
 from ..model.environment import Boundary, Dialect, Environment, MultiBody, Resolution
-from .blocks import Grammar, check_limit, is_multibody_tag, read_boundary, warn_of_count
+from .blocks import check_limit, is_multibody_tag, read_boundary, warn_of_count
 from .lexer import Scanner
-from .multibodies import read_multibody, read_multibody_of_a, read_robot_bodies
+from .multibodies import read_linked_bodies, read_multibody
 
-_RESOLUTION_TAGS = {
+RESOLUTION_TAGS = {
     "PositionRes": "position",
     "PositionResFactor": "position_factor",
     "Orientation": "orientation",
     "TimeRes": "time",
     "RDRes": "rd",
 }
-_HEADER_TAGS = {**_RESOLUTION_TAGS, "Multibodies": None, "Obstacles": None}
+_HEADER_TAGS = {**RESOLUTION_TAGS, "Multibodies": None, "Obstacles": None}
 _ENVIRONMENT_VERSIONS = {"0", "20001022", "20020327"}
-# Classes whose configurations are the base, then the joints; others have a layout of their own (section 9.5).
+# Classes whose configurations are the base, then the joints; others have a layout of their own.
 _CONFIGURATION_CLASSES = {"cfg_free", "cfg_free_tree", "cfg_free_serial", "cfg_fixed_tree", "cfg_free_cc"}
+_COUNT_AND_WORD = re.compile(r"[0-9]+\s+([A-Za-z]+)(?!\S)")
 
 
 def read_env(scan: Scanner, dialect: Dialect, semantics: str) -> Environment:
     """Read a whole env file of a known dialect.
 
     Raises:
-        FormatError: The text breaks the grammar (env-format sections 3 to 8).
+        FormatError: The text breaks the grammar (docs/format/env.md).
     """
-    grammar = Grammar.of(dialect, semantics)
+    rules = rules_of(dialect, semantics)
     boundary, resolution = None, Resolution()
     if dialect is Dialect.A:
         _check_header(scan)
     if scan.peek_word().lower().startswith("bound"):
         boundary, resolution = _read_preamble(scan)
-    multibodies, declared = _read_multibodies(scan, grammar)
-    _check_ending(scan, grammar)
+    multibodies, declared = _read_multibodies(scan, rules)
+    _check_ending(scan, rules)
     return Environment(
         name=Path(scan.source.path).stem,
         dialect=dialect,
@@ -57,7 +56,7 @@ def read_env(scan: Scanner, dialect: Dialect, semantics: str) -> Environment:
 
 
 def _check_header(scan: Scanner) -> None:
-    """Judge dialect A's `#Environment Version N` and `#Cfg_...` lines (env-format section 3.1)."""
+    """Judge dialect A's `#Environment Version N` and `#Cfg_...` lines."""
     scan.peek()
     for comment in scan.comments:
         words = comment.text.lstrip("#").split()
@@ -90,47 +89,40 @@ def _read_preamble(scan: Scanner) -> tuple[Boundary, Resolution]:
             resolution = replace(resolution, span=scan.span(start))
 
 
-def _read_multibodies(scan: Scanner, grammar: Grammar) -> tuple[tuple[MultiBody, ...], int]:
+def _read_multibodies(scan: Scanner, rules: DialectRules) -> tuple[tuple[MultiBody, ...], int]:
     start = scan.position
-    declared = scan.count("the number of multibodies", scan.limits.bodies, "bodies")
+    declared = scan.count("the number of multibodies", "bodies")
     span = scan.span(start)
-    read = read_multibody_of_a if grammar.dialect is Dialect.A else read_multibody
     found: list[MultiBody] = []
     bodies = connections = 0
     while not scan.at_end():
         if len(found) >= declared and not is_multibody_tag(scan.peek_word()):
-            _ignore_rest(scan)
+            _ignore_rest(scan, "multibody")
             break
-        found.append(read(scan, grammar))
+        found.append(read_multibody(scan, rules))
         bodies += len(found[-1].bodies)
         connections += len(found[-1].connections)
-        check_limit(scan, bodies, scan.limits.bodies, "body", "bodies")
-        check_limit(scan, connections, scan.limits.connections, "connection", "connections")
+        check_limit(scan, bodies, "body", "bodies")
+        check_limit(scan, connections, "connection", "connections")
     if declared != len(found):
         warn_of_count(scan, declared, len(found), "multibody", span)
     return tuple(found), declared
 
 
-def _ignore_rest(scan: Scanner) -> None:
-    hint = "begin comment lines with '#'"
-    scan.log.warn("ENV209", scan.source.path, "text behind the last multibody is not used", hint=hint, span=scan.span())
+def _ignore_rest(scan: Scanner, last: str) -> None:
+    message, hint = f"text behind the last {last} is not used", "begin comment lines with '#'"
+    scan.log.warn("ENV209", scan.source.path, message, hint=hint, span=scan.span())
     scan.advance(len(scan.source.text))
 
 
-def _check_ending(scan: Scanner, grammar: Grammar) -> None:
+def _check_ending(scan: Scanner, rules: DialectRules) -> None:
     text = scan.source.text
-    if text and not text[-1].isspace():
-        message = "no newline at the end of the file"
-        hint = "end the last line with a newline, if nothing is missing"
-        span = scan.source.span(len(text) - 1)
-        if grammar.rules.needs_final_newline:
-            message += ": the original reader fails here"
-            scan.log.warn("ENV210", scan.source.path, message, hint=hint, span=span)
-        else:
-            scan.log.info("ENV210", scan.source.path, message, hint=hint, span=span)
-
-
-_COUNT_AND_WORD = re.compile(r"[0-9]+\s+([A-Za-z]+)(?!\S)")
+    if not text or text[-1].isspace():
+        return
+    report = scan.log.warn if rules.needs_final_newline else scan.log.info
+    message = f"no newline at the end of the file{': the original reader fails here' * rules.needs_final_newline}"
+    hint = "end the last line with a newline, if nothing is missing"
+    report("ENV210", scan.source.path, message, hint=hint, span=scan.source.span(len(text) - 1))
 
 
 def read_robot(scan: Scanner) -> MultiBody:
@@ -145,10 +137,9 @@ def read_robot(scan: Scanner) -> MultiBody:
         message = "a robot file begins with its body count, not with a tag"
         scan.log.warn("ENV211", "Active", message, hint="remove the tag", span=scan.span())
         scan.word("Active")
-    robot = read_robot_bodies(scan, Grammar.of(Dialect.E))
+    robot = read_linked_bodies(scan, rules_of(Dialect.E))
     if not scan.at_end():
-        message = "text behind the last connection is not used"
-        scan.log.warn("ENV209", scan.source.path, message, hint="begin comment lines with '#'", span=scan.span())
+        _ignore_rest(scan, "connection")
     return replace(robot, robot_file=scan.source.path)
 
 

@@ -1,4 +1,4 @@
-"""The nodes and edges of a roadmap, in whichever of the known layouts they are written (env-format section 13.3)."""
+"""The nodes and edges of a roadmap, in any of the layouts that were ever written (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def read_nodes(
         The nodes, and what of them is not used.
 
     Raises:
-        FormatError: The numbers are no nodes of these robots in any layout.
+        FormatError: The numbers fit these robots in no layout.
     """
     words = _words(source, *part)
     best: tuple[int, _Misfit] | None = None
@@ -152,7 +152,7 @@ def _layouts(version: str, robots: int) -> Iterator[_Layout]:
     """Yield all layouts, those of the version first.
 
     A version stands above the graph up to 2011: 061300 and later have three info fields, 62000 and 061100 two, and
-    older ones none. Since 2012 there is none, and each edge has intermediates.
+    older ones none. Files since 2012 have no version, and each of their edges has intermediates.
     """
     infos = [0, 2, _MODERN_INFO]
     forms = [EdgeForm.INTERMEDIATES, EdgeForm.CONTROLS, EdgeForm.PLANNER, EdgeForm.WEIGHT]
@@ -275,14 +275,10 @@ def _fail(
 ) -> NoReturn:
     expected = " or ".join(f"{d} (robot {i})" for i, d in enumerate(dofs)) or "none"
     if misfit.at >= len(words):
-        message = (
-            f"the nodes end where {misfit.expected} was expected; robots have so many degrees of freedom: {expected}"
-        )
+        message = f"the nodes end where {misfit.expected} was expected; degrees of freedom of the robots: {expected}"
         hint = "is the file cut off, or the roadmap of another scene?"
         log.fail("CFG522", source.path, message, hint=hint, span=source.span(max(0, end - 1)))
     word = words[misfit.at]
-    message = (
-        f"expected {misfit.expected}, found {word.text[:60]!r}; robots have so many degrees of freedom: {expected}"
-    )
+    message = f"expected {misfit.expected}, found {word.text[:60]!r}; degrees of freedom of the robots: {expected}"
     hint = coordinate_hint(word.text) or "is it the roadmap of another scene?"
     log.fail("CFG529", source.path, message, hint=hint, span=source.span(word.start, word.start + len(word.text)))

@@ -17,10 +17,10 @@ from .source import Source
 
 T = TypeVar("T")
 
-# What C++ stream extraction accepts: no nan, inf or hexadecimal (env-format section 3.2). A number may be followed
+# What C++ stream extraction accepts: no nan, inf or hexadecimal. A number may be followed
 # by a comment, but 1.#INF is how some C++ libraries print infinity.
 _END = r"(?=[\s;:()\[\]]|#(?!INF|IND|QNAN|SNAN)|\Z)"
-# Digits belong to one part of the pattern only: else a long run of them is split in every way before it is no number.
+# Digits belong to one part of the pattern only: else a long run of them is split in every way before it is refused.
 _NUMBER = re.compile(rf"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?{_END}")
 _INTEGER = re.compile(rf"[+-]?[0-9]+{_END}")
 _WORD = re.compile(r"[^\s;\[\]]+")
@@ -34,7 +34,7 @@ _HEXADECIMAL = re.compile(r"[+-]?0x", re.IGNORECASE)
 
 
 def parse_number(word: str) -> float | None:
-    """Return the finite number that a word is, as C++ reads it; None where it is none."""
+    """Return the finite number that a word is, as C++ reads it; None where it is not one."""
     if not _NUMBER.fullmatch(word):
         return None
     value = float(word)
@@ -42,10 +42,10 @@ def parse_number(word: str) -> float | None:
 
 
 def parse_integer(word: str) -> int | None:
-    """Return the integer that a word is; None where it is none, or too large for a number."""
+    """Return the integer that a word is; None where it is not one, or too large for a number."""
     if not _INTEGER.fullmatch(word) or math.isinf(float(word)):
         return None
-    # Python counts leading zeros among the digits of which it takes so many only.
+    # Python takes a limited number of digits, and counts leading zeros among them.
     size = int(word.lstrip("+-").lstrip("0") or "0")
     return -size if word.startswith("-") else size
 
@@ -146,11 +146,8 @@ class Scanner:
             self.fail_expected(what)
         length = match.end() - match.start()
         if length > self.limits.name_length:
-            self.fail(
-                "ENV109",
-                f"a word of {length} characters; at most {self.limits.name_length} are read",
-                hint=Limits.hint("name_length"),
-            )
+            message = f"a word of {length} characters; at most {self.limits.name_length} are read"
+            self.fail("ENV109", message, hint=Limits.hint("name_length"))
         self._position = match.end()
         return Token(match.group(), match.start(), match.end())
 
@@ -166,9 +163,9 @@ class Scanner:
         """Read an integer."""
         return self._numeral(_INTEGER, parse_integer, f"an integer ({what})", what)
 
-    def count(self, what: str, at_most: int, limit: str) -> int:
+    def count(self, what: str, limit: str) -> int:
         """Read a count that is neither negative nor beyond a limit, one of the fields of `Limits`."""
-        start = self.position
+        start, at_most = self.position, getattr(self.limits, limit)
         value = self.integer(what)
         if not 0 <= value <= at_most:
             hint = Limits.hint(limit) if value > 0 else "write how many follow"

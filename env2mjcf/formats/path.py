@@ -1,4 +1,4 @@
-"""Path files of all ages: configurations, or world poses of every link (env-format section 13.2)."""
+"""Path files of all ages: configurations, or world poses of every link (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def read_path(source: Source, dofs: Sequence[int], links: Sequence[int], log: Di
         log: Where findings go.
 
     Raises:
-        FormatError: It is no path file, is cut off, or is one of another robot.
+        FormatError: It is not a path file, is cut off, or belongs to another robot.
     """
     head = _read_head(source, log)
     lines = number_lines(source, log, head.end)
@@ -121,16 +121,14 @@ def _read_head(source: Source, log: DiagnosticLog) -> _Head:
         log.fail("CFG510", source.path, message, hint=hint, span=source.span(start, start + len(text)))
     version = int(match[1])
     if text.rstrip() != f"{_HEADER} {version}":
-        message = f"the newest planner reads only '{_HEADER} {CURRENT}', to the letter"
+        message = f"the newest planner reads nothing but the exact line '{_HEADER} {CURRENT}'"
         hint = "write three blanks behind VIZMO_PATH_FILE, and nothing in front"
         log.warn("CFG511", source.path, message, hint=hint, span=source.span(start))
     if version not in _KNOWN:
         known = ", ".join(map(str, _KNOWN))
         message = f"path version {version}; known are {known}"
-        hint = "it is read as its rows suggest"
-        log.warn(
-            "CFG512", source.path, message, hint=hint, span=source.span(start + match.start(1), start + match.end(1))
-        )
+        span = source.span(start + match.start(1), start + match.end(1))
+        log.warn("CFG512", source.path, message, hint="it is read as its rows suggest", span=span)
     words = _words_behind(source, start + len(text))
     links, links_span, end = _count(source, words, "number of links of a pose, or 1", log)
     count, count_span, end = _count(source, words, "number of configurations", log)

@@ -1,4 +1,4 @@
-"""The planner's problem XML: environment, robots and tasks together."""
+"""The planner's problem XML: environment, robots and tasks together (docs/format/xml.md)."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def _read_rules(root: Node) -> PlannerRules:
 def _read_links(node: Node, name: str) -> int:
     number = node.integer(name)
     if number < 0:
-        hint = "links within so many connections are not tested"
+        hint = "links that are fewer connections apart are not tested"
         node.fail("ENV110", f"{name} is {number}; expected 0 or more", hint=hint, at=name)
     return number
 

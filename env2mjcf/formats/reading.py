@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,7 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
 
 
 def _sources(source: Source, environment: Environment, options: Options) -> tuple[str, ...]:
-    # The env file that a problem names is another than the problem.
+    # A problem file names another file, the environment's.
     names = (source.path, environment.path, *(m.robot_file for m in environment.multibodies), options.query)
     return tuple(dict.fromkeys(os.fsdecode(name) for name in names if name))
 
@@ -106,9 +107,8 @@ def _check_semantics(source: Source, dialect: Dialect, options: Options) -> None
 def _xml_environment(root: Node, options: Options) -> Environment:
     _check_semantics(root.source, Dialect.E, options)
     if options.dialect not in (None, "E"):
-        raise ValueError(
-            f"{root.source.path} is XML, which is dialect E; it cannot be read as dialect {options.dialect}"
-        )
+        message = f"{root.source.path} is XML, which is dialect E; it cannot be read as dialect {options.dialect}"
+        raise ValueError(message)
     if root.tag.lower() == "robot":
         hint = "read the environment, and give this file as robots=[...] (--robots)"
         root.fail("ENV131", f"{root.source.path} is a robot file, not an environment", hint=hint)
@@ -148,10 +148,10 @@ def _with_robots(
 ) -> Environment:
     """Add robots, each file read once however often it is named, until the scene is larger than the limits."""
     read: dict[str, MultiBody] = {}
-    multibodies: list[MultiBody] = []
-    size = _Size(environment.path, options.limits, log)
-    for multibody in environment.multibodies:
-        size.add(multibody)
+    multibodies = list(environment.multibodies)
+    size: Counter[str] = Counter()
+    for multibody in multibodies:
+        _count(size, multibody, environment.path, options.limits, log)
     for robot in named:
         path = os.fspath(robot.path)
         place = path if "\0" in path else os.path.realpath(path)
@@ -162,32 +162,17 @@ def _with_robots(
             read[place] = _robot_file(found, log)
         # One of its own each time, because robots are told apart by identity.
         multibodies.append(dataclasses.replace(read[place], label=robot.label or read[place].label))
-        size.add(multibodies[-1])
-    return dataclasses.replace(environment, multibodies=(*environment.multibodies, *multibodies))
+        _count(size, multibodies[-1], environment.path, options.limits, log)
+    return dataclasses.replace(environment, multibodies=tuple(multibodies))
 
 
-class _Size:
-    """Counts what a scene has, and refuses one that is larger than its limits."""
-
-    def __init__(self, path: str, limits: Limits, log: DiagnosticLog) -> None:
-        self._path, self._limits, self._log = path, limits, log
-        self._bodies = self._connections = 0
-
-    def add(self, multibody: MultiBody) -> None:
-        """Count one more multibody.
-
-        Raises:
-            FormatError: Now there are too many bodies, or connections.
-        """
-        self._bodies += len(multibody.bodies)
-        self._connections += len(multibody.connections)
-        self._check("bodies", self._bodies, self._limits.bodies)
-        self._check("connections", self._connections, self._limits.connections)
-
-    def _check(self, what: str, found: int, at_most: int) -> None:
-        if found > at_most:
-            message = f"the scene has {found} {what} or more; at most {at_most} are read"
-            self._log.fail("ENV110", self._path, message, hint=Limits.hint(what))
+def _count(size: Counter[str], multibody: MultiBody, path: str, limits: Limits, log: DiagnosticLog) -> None:
+    """Count the bodies and connections of one more multibody; refuse more than the limits allow of a scene."""
+    for what in ("bodies", "connections"):
+        size[what] += len(getattr(multibody, what))
+        if size[what] > getattr(limits, what):
+            message = f"the scene has {size[what]} {what} or more; at most {getattr(limits, what)} are read"
+            log.fail("ENV110", path, message, hint=Limits.hint(what))
 
 
 def _robot_file(source: Source, log: DiagnosticLog) -> MultiBody:
@@ -232,11 +217,8 @@ def _problem_task(task: ProblemTask, robot: int, dofs: list[int]) -> Task:
     for row in task.rows:
         taken = split_row(row, dofs[robot : robot + 1])
         if taken is None:
-            task.node.fail(
-                "CFG504",
-                f"a point of {len(row)} numbers in task {task.label!r}; "
-                f"expected {dofs[robot]}, the degrees of freedom of robot {task.robot!r}",
-                hint="is the task meant for another robot?",
-            )
+            found = f"a point of {len(row)} numbers in task {task.label!r}"
+            message = f"{found}; expected {dofs[robot]}, the degrees of freedom of robot {task.robot!r}"
+            task.node.fail("CFG504", message, hint="is the task meant for another robot?")
         configurations.append(taken[1])
     return Task(robot, tuple(configurations), task.label, task.node.span)

@@ -1,4 +1,4 @@
-"""Roadmap files of all ages: graphs of configurations (env-format section 13.3)."""
+"""Roadmap files of all ages: graphs of configurations (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _START, _STOP = "#####GRAPHSTART#####", "#####GRAPHSTOP#####"
 _GRAPH_START = re.compile(r"(?<!\S)\S*?GRAPHSTART\S*")
 _GRAPH_STOP = re.compile(r"(?<!\S)\S*?GRAPHSTOP\S*")
 _SECTION = re.compile(r"(?<!#)#{3,}(PREAMBLE|ENVFILE|LP|CD|DM|RNGSEED)START#{3,}[ \t]*")
-# What would end the line of the env file's name, or begin a section in it, or is no text.
+# What would end the line of the env file's name, or begin a section in it, or is not text.
 _UNFIT = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]|#{3,}|(?<=GRAPH)(?=ST)")
 _VERSION = re.compile(r"\s*(PMPL )?Roadmap Version( Number)?\s+(\S+)", re.IGNORECASE)
 _COUNTS = re.compile(r"\s*(\S+)\s+(\S+)\s+(\S+)")
@@ -76,8 +76,8 @@ def is_roadmap(source: Source) -> bool:
 def read_roadmap(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> RoadmapFile:
     """Read a roadmap of any version.
 
-    How nodes and edges are built is found by trying, what the version suggests first: numbers that are no whole
-    numbers where whole ones must stand tell. Declared counts are compared with what is there, not believed.
+    How nodes and edges are built is found by trying, what the version suggests first: a layout is wrong where it puts
+    a fraction in the place of a whole number. Declared counts are compared with what is there, not believed.
 
     Args:
         source: The file.
@@ -85,7 +85,7 @@ def read_roadmap(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> Roa
         log: Where findings go.
 
     Raises:
-        FormatError: It is no roadmap, is cut off, or is one of another robot.
+        FormatError: It is not a roadmap, is cut off, or belongs to another robot.
     """
     start = _GRAPH_START.search(source.text)
     if start is None:
@@ -137,9 +137,15 @@ def _read_header(source: Source, end: int, log: DiagnosticLog) -> RoadmapHeader:
         return "\n".join(sections.get(name, [])).strip()
 
     return RoadmapHeader(
-        version[3] if version else "", text("ENVFILE"), text("PREAMBLE"), lines("LP"), lines("CD"), lines("DM"),
-        text("RNGSEED"), version is not None and not version[1],
-    )  # fmt: skip
+        version=version[3] if version else "",
+        environment=text("ENVFILE"),
+        preamble=text("PREAMBLE"),
+        local_planners=lines("LP"),
+        collision_detectors=lines("CD"),
+        distance_metrics=lines("DM"),
+        seed=text("RNGSEED"),
+        of_turns=version is not None and not version[1],
+    )
 
 
 def _section(source: Source, begin: re.Match[str], end: int, log: DiagnosticLog) -> list[str]:
@@ -165,23 +171,17 @@ def _read_counts(source: Source, begin: int, end: int, log: DiagnosticLog) -> tu
 
 def _compare(source: Source, counts: _Counts, nodes: Sequence[Node], *, whole: bool, log: DiagnosticLog) -> None:
     """Compare declared counts with what was read."""
+    last = source.span(max(0, len(source.text.rstrip()) - 1))
     if not whole and len(nodes) < counts.nodes:
         message = f"the roadmap ends behind {len(nodes)} of {counts.nodes} nodes, without GRAPHSTOP"
-        hint = "is the file cut off?"
-        log.fail("CFG522", source.path, message, hint=hint, span=source.span(max(0, len(source.text.rstrip()) - 1)))
+        log.fail("CFG522", source.path, message, hint="is the file cut off?", span=last)
     if not whole:
-        log.warn(
-            "CFG524",
-            source.path,
-            f"the roadmap ends without '{_STOP}'",
-            hint="is the file cut off?",
-            span=source.span(max(0, len(source.text.rstrip()) - 1)),
-        )
+        log.warn("CFG524", source.path, f"the roadmap ends without '{_STOP}'", hint="is the file cut off?", span=last)
     if len(nodes) != counts.nodes:
         message = f"declares {counts.nodes} nodes, and has {len(nodes)}"
         log.warn("CFG523", source.path, message, hint=f"write {len(nodes)}", span=counts.span)
     entries = sum(len(node.edges) for node in nodes)
-    # Up to 061300 an edge was counted once, later at both of its ends (env-format section 13.3).
+    # Up to 061300 an edge was counted once, later at both of its ends.
     if counts.edges not in (entries, entries / 2):
         message = f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge"
         hint = f"write {entries}, or {entries // 2} up to version 061300"

@@ -1,6 +1,6 @@
-"""Rows of numbers that are configurations, as query and path files hold them (env-format sections 9.6 and 13).
+"""Rows of numbers that are configurations, as path files hold them, and query files of all ages, which hold no more.
 
-MERGED: Query files of all ages: configurations to be visited in turn (env-format sections 9.6 and 13.1).
+What the files look like: docs/format/companions.md.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import groupby
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
@@ -58,13 +57,13 @@ class Line:
 
 
 def coordinate(word: str) -> float | None:
-    """Return the number that a word is; None where it is none, or no length or angle that can be computed with."""
+    """Return the number that a word is; None where it is not one, or too large to be computed with."""
     value = parse_number(word)
     return value if value is not None and abs(value) <= LARGEST else None
 
 
 def coordinate_hint(word: str) -> str:
-    """Return what to do about a word that is no coordinate; empty where it does not look like a number."""
+    """Return what to do about a word that is not a coordinate; empty where it does not look like a number."""
     too_large = parse_number(word) is not None and coordinate(word) is None
     return f"numbers must not be larger than {LARGEST:g}" if too_large else number_hint(word)
 
@@ -80,7 +79,7 @@ def parse_row(numbers: Sequence[float], dofs: Sequence[int]) -> Row | None:
     if not dofs or not numbers:
         return None
     plain = _extra(len(numbers), dofs[0], legacy=True)
-    # A lone robot's exact width needs no index; several robots always have one (env-format section 9.6).
+    # A lone robot's exact width needs no index; several robots always have one.
     if plain is Extra.NOTHING and len(dofs) == 1:
         return Row(0, tuple(numbers), False, plain)
     first = numbers[0]
@@ -121,13 +120,9 @@ def number_lines(source: Source, log: DiagnosticLog, start: int = 0) -> list[Lin
 
 
 def check_rows(source: Source, count: int, log: DiagnosticLog, span: Span) -> None:
-    """Make sure that a file has not more configurations or nodes than its limits allow.
-
-    Raises:
-        FormatError: It has.
-    """
+    """Refuse a file with more configurations or nodes than its limits allow."""
     if count > source.limits.rows:
-        message = f"{source.path} has more than {source.limits.rows} configurations; at most so many are read"
+        message = f"{source.path} has more than {source.limits.rows} configurations; no more are read"
         log.fail("ENV182", source.path, message, hint=Limits.hint("rows"), span=span)
 
 
@@ -170,18 +165,7 @@ def regrouped(lines: Sequence[Line], dofs: Sequence[int]) -> Sequence[Line]:
 
 
 def fitting(source: Source, line: Line, dofs: Sequence[int], log: DiagnosticLog, what: str) -> Row:
-    """Return what a line is.
-
-    Args:
-        source: The file.
-        line: Its numbers.
-        dofs: Number of degrees of freedom of each robot.
-        log: Where findings go.
-        what: What the file is, for the message.
-
-    Raises:
-        FormatError: It fits no robot.
-    """
+    """Return the configuration of a line, or fail where it fits no robot; the message calls the file `what`."""
     row = parse_row(line.numbers, dofs)
     if row is None:
         expected = " or ".join(f"{d} (robot {i})" for i, d in enumerate(dofs)) or "none: the scene has no robot"
@@ -194,7 +178,7 @@ def fitting(source: Source, line: Line, dofs: Sequence[int], log: DiagnosticLog,
 
 
 def judge_rows(source: Source, rows: Iterable[tuple[Row, Span]], log: DiagnosticLog) -> None:
-    """Report what is doubtful about rows that each fit: different makes, and numbers that are dropped."""
+    """Report what is doubtful about rows that each fit: different forms, and numbers that are dropped."""
     listed = list(rows)
     if not listed:
         return
@@ -202,7 +186,7 @@ def judge_rows(source: Source, rows: Iterable[tuple[Row, Span]], log: Diagnostic
     odd = next((span for row, span in listed if (row.indexed, row.extra) != (first.indexed, first.extra)), None)
     if odd is not None:
         hint = "give every row, or none, a robot index and velocities"
-        log.warn("CFG506", source.path, "a row that is built otherwise than the first one", hint=hint, span=odd)
+        log.warn("CFG506", source.path, "this row is not built like the first one", hint=hint, span=odd)
     dropped = next(((row, span) for row, span in listed if row.extra is not Extra.NOTHING), None)
     if dropped is not None:
         row, span = dropped
@@ -235,7 +219,7 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
         One task for each robot that has configurations, in the order of the robots.
 
     Raises:
-        FormatError: A row fits no robot, or there is none.
+        FormatError: A row fits no robot, or the file has no row.
     """
     lines = regrouped(number_lines(source, log), dofs)
     if not lines:
@@ -246,15 +230,12 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
     if len(rows) == 1:
         hint = "is the file cut off?"
         log.warn("CFG508", source.path, "one configuration; expected a start and a goal", hint=hint, span=rows[0][1])
-    tasks: list[Task] = []
-    for robot, group in groupby(sorted(rows, key=_robot), _robot):
-        own = list(group)
-        tasks.append(Task(robot, tuple(row.configuration for row, _ in own), span=own[0][1]))
-    return tuple(tasks)
-
-
-def _robot(placed: tuple[Row, Span]) -> int:
-    return placed[0].robot
+    groups: dict[int, list[tuple[Row, Span]]] = {}
+    for row, span in rows:
+        groups.setdefault(row.robot, []).append((row, span))
+    return tuple(
+        Task(robot, tuple(row.configuration for row, _ in own), span=own[0][1]) for robot, own in sorted(groups.items())
+    )
 
 
 def query_text(tasks: Iterable[Task], *, index: bool) -> str:

@@ -40,7 +40,8 @@ class Source:
         path: The file, as it was named by the caller.
         text: The whole text, without a byte order mark; line ends as in the file.
         limits: What may be in it.
-        place: Where all of it stands, if it is no text of a file but what one means; no part has a place of its own.
+        place: Where all of it stands, if it is not the text of a file but what that text means, as with the value of
+            an XML attribute; no part has a place of its own then.
     """
 
     path: str
@@ -82,7 +83,7 @@ class Source:
         return self.span(start + column, start + column + len(near))
 
     def column_span(self, line: int, column: int) -> Span:
-        """Return the place of a column of a line, both given from 1; the nearest where there is no such one."""
+        """Return the place of a column of a line, both given from 1; the nearest that there is."""
         row = min(max(line, 1), len(self._starts)) - 1
         start = self._starts[row]
         return self.span(start + max(0, min(column - 1, self._line_end(row) - start)))
@@ -102,7 +103,7 @@ class Source:
 def quoted(begin: int, end: int, place: int) -> tuple[int, int]:
     """Return which part of the line from `begin` to `end` is quoted about a place.
 
-    The whole line, unless it is very long: each of the bodies of a scene on one line would hold it whole.
+    The whole line, unless it is very long: else each of many bodies on one line would keep a copy of it.
     """
     if end - begin <= _LONGEST_QUOTE:
         return begin, end
@@ -131,7 +132,7 @@ def read_source(
         log: Where findings go.
         limits: Bounds on hostile input.
         named_at: Where another file names this one, for messages.
-        regular: Whether it has to be a regular file. Only who names a file himself may name a pipe, and wait for it.
+        regular: Whether it has to be a regular file. The user may name a pipe and wait for it; a file may not.
 
     Raises:
         FormatError: The file is missing, a folder, unreadable, too large, UTF-16 or UTF-32, or not text.
@@ -173,7 +174,7 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
             holds = f"; it holds {', '.join(inside[:8])}" if inside else ""
             fail("ENV102", f"{name} is a folder; expected a file", f"name the file in it{holds}")
         with open_regular(name) if regular else open(name, "rb") as file:
-            # One more than allowed: the size that the system states is no bound for pipes and devices.
+            # One more than allowed: the size that the system states does not bound pipes and devices.
             data = read_at_most(file, limits.file_bytes + 1)
     except FileNotFoundError:
         others = _names_in(Path(name).parent)
@@ -183,16 +184,12 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
     except OSError as error:
         fail("ENV104", f"{name} cannot be read: {error.strerror}", "check the name and the disk")
     if len(data) > limits.file_bytes:
-        fail(
-            "ENV105",
-            f"{name} has more than {limits.file_bytes} bytes; at most so many are read",
-            Limits.hint("file_bytes"),
-        )
+        fail("ENV105", f"{name} has more than {limits.file_bytes} bytes; no more are read", Limits.hint("file_bytes"))
     return data
 
 
 def read_at_most(file: IO[bytes], count: int) -> bytes:
-    """Read so many bytes of a file, or all that it has; `file.read` would make room for all of them at once."""
+    """Read at most `count` bytes of a file, part by part: `file.read` would make room for all of them at once."""
     parts: list[bytes] = []
     while count > 0 and (part := file.read(min(count, _PART))):
         parts.append(part)

@@ -1,10 +1,11 @@
-"""Dialect E's XML environments and XML robots (env-format section 8.3)."""
+"""Dialect E's XML environments and XML robots (docs/format/xml.md)."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
+from ..model.dialects import rules_of
 from ..model.environment import (
     Actuator,
     BaseKind,
@@ -20,12 +21,12 @@ from ..model.environment import (
     Pose,
     Recentring,
 )
-from .blocks import SHAPES, Grammar, read_color, read_dh, read_extent, read_pose
+from .blocks import SHAPES, read_color, read_dh, read_extent, read_pose
 from .bodies import SELF_CONNECTION, read_body_index, read_limits, warn_of_no_limits
 from .lexer import Scanner
 from .xml import Node
 
-_GRAMMAR = Grammar.of(Dialect.E)
+_RULES = rules_of(Dialect.E)
 _JOINTS = {"revolute": JointType.REVOLUTE, "spherical": JointType.SPHERICAL, "nonactuated": JointType.NON_ACTUATED}
 _RANGES = {JointType.REVOLUTE: ("range",), JointType.SPHERICAL: ("range", "range2"), JointType.NON_ACTUATED: ()}
 _KINDS = {"passive": MultiBodyKind.PASSIVE, "internal": MultiBodyKind.INTERNAL, "surface": MultiBodyKind.SURFACE}
@@ -54,12 +55,12 @@ def read_environment(node: Node) -> Environment:
 
 
 def with_environment_attributes(environment: Environment, node: Node) -> Environment:
-    """Apply the attributes of an `<Environment>` element, which override the file (env-format section 8.1)."""
+    """Apply the attributes of an `<Environment>` element, which override the file."""
     resolution = environment.resolution
     for attribute, name in _RESOLUTIONS.items():
         value = node.number(attribute) if node.get(attribute) is not None else 0.0
         if value > 0:
-            value = value * _GRAMMAR.rules.configuration_angle if name == "orientation" else value
+            value = value * _RULES.configuration_angle if name == "orientation" else value
             resolution = replace(resolution, **{name: value})
             if name == "position":
                 resolution = replace(resolution, span=node.span_of(attribute))
@@ -89,7 +90,7 @@ def read_robot(node: Node) -> MultiBody:
         tuple(bodies),
         tuple(connections),
         dialect=Dialect.E,
-        dh_form=_GRAMMAR.rules.dh_form,
+        dh_form=_RULES.dh_form,
         actuators=_read_actuators(node),
         robot_file=node.source.path,
         span=multibody.span,
@@ -136,14 +137,10 @@ def _read_obstacle(node: Node) -> MultiBody:
     base = node.only_child("Base", "ENV145")
     node.ignore_other_children("Base")
     if base.get("type") is not None and base.choice("type", {**_BASES, "joint": "Joint"}) != "Fixed":
-        base.fail(
-            "ENV123",
-            f"an obstacle with a {base.get('type')} base; expected fixed",
-            hint="write type='fixed'",
-            at="type",
-        )
+        message = f"an obstacle with a {base.get('type')} base; expected fixed"
+        base.fail("ENV123", message, hint="write type='fixed'", at="type")
     body = _read_body(base, BaseKind.FIXED)
-    return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_GRAMMAR.rules.dh_form, span=node.span)
+    return MultiBody(kind, (body,), dialect=Dialect.E, dh_form=_RULES.dh_form, span=node.span)
 
 
 def _read_base(node: Node) -> BaseKind:
@@ -154,7 +151,7 @@ def _read_base(node: Node) -> BaseKind:
 
 
 def _read_body(node: Node, base: BaseKind, *more_attributes: str) -> Body:
-    # XML meshes are not recentred by default, unlike those of text files (env-format section 10.3).
+    # XML meshes are not recentred by default, unlike those of text files.
     recentring = Recentring.NONE if node.get("comAdjustment") is None else node.choice("comAdjustment", _ADJUSTMENTS)
     body = Body(
         node.require("filename"),
@@ -215,7 +212,7 @@ def _read_connection(link: Node, number: int, bodies: int) -> Connection:
         following,
         joint,
         to_dh=node.read("transformParentToDH", _pose),
-        dh=node.read("initialDHParams", lambda scan: read_dh(scan, _GRAMMAR)),
+        dh=node.read("initialDHParams", lambda scan: read_dh(scan, _RULES)),
         to_body=node.read("transformDHToChild", _pose),
         limits=tuple(_read_limits(node, name, joint) for name in ranges),
         span=node.span,
@@ -224,11 +221,11 @@ def _read_connection(link: Node, number: int, bodies: int) -> Connection:
 
 def _read_limits(node: Node, name: str, joint: JointType) -> JointLimits:
     if node.get(name) is not None:
-        return node.read(name, lambda scan: read_limits(scan, _GRAMMAR, joint))
-    warn_of_no_limits(node.log, _GRAMMAR, joint, node.span)
-    unit = _GRAMMAR.rules.configuration_angle
+        return node.read(name, lambda scan: read_limits(scan, _RULES, joint))
+    warn_of_no_limits(node.log, _RULES, joint, node.span)
+    unit = _RULES.configuration_angle
     return JointLimits(-unit, unit, node.span)
 
 
 def _pose(scan: Scanner) -> Pose:
-    return read_pose(scan, _GRAMMAR)
+    return read_pose(scan, _RULES)

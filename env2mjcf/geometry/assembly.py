@@ -25,7 +25,7 @@ from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 from .store import GeometryCache, default_folder
 
-# Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
+# Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles.
 _THICKNESS_PER_EXTENT = 5e-6
 
 # Extents in metres beyond which the unit of a file is doubtful.
@@ -83,7 +83,7 @@ class RobotParts:
 
     @property
     def radius(self) -> float:
-        """The planner's bounding radius r_0 + 2 sum r_i (env-format section 10.4)."""
+        """The planner's bounding radius r_0 + 2 sum r_i, where body i has its vertices within r_i of its origin."""
         radii = [p.radius for p in self.links]
         return radii[0] + 2 * sum(radii[1:])
 
@@ -109,7 +109,7 @@ class Assembly:
 
     @property
     def extent(self) -> float:
-        """Diagonal of the bounding box: the unit of every tolerance (design: section 2)."""
+        """Diagonal of the bounding box: the unit of every tolerance."""
         return float(np.linalg.norm(self.upper - self.lower))
 
     @property

@@ -68,7 +68,7 @@ class Mesh:
         return h.hexdigest()
 
     def recentred(self, recentring: Recentring) -> Mesh:
-        """Return the mesh as the planner places it (env-format section 10.3).
+        """Return the mesh as the planner places it (docs/format/meshes.md).
 
         `COM` subtracts the unweighted mean of the whole vertex list, `Surface` its x and z only.
         """

@@ -1,4 +1,4 @@
-"""Forward kinematics of a robot, batched over configurations, in radians and the lengths of its multibody."""
+"""Poses of a robot's bodies from its configuration, and back; batched, in radians and the lengths of its multibody."""
 
 from __future__ import annotations
 
@@ -11,11 +11,19 @@ from numpy.typing import ArrayLike
 from ..diagnostics import DiagnosticLog
 from ..model.environment import BaseKind, DHForm, Dialect, MultiBody, Pose
 from ..system.locks import lasting
-from .transforms import Array, dh_matrix, inverse, pose_matrix, rotation_matrix, transform, wrap
-from .tree import Dof, DofKind, Tree, build_tree, degrees_of_freedom
-
-_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
-_POSITIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+from .transforms import (
+    Array,
+    angles_from_quaternion,
+    dh_matrix,
+    inverse,
+    pose_gaps,
+    pose_matrix,
+    quaternion_from_matrix,
+    rotation_matrix,
+    transform,
+    wrap,
+)
+from .tree import POSITIONS, ROTATIONS, Dof, DofKind, Tree, build_tree, degrees_of_freedom
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,7 @@ class RobotKinematics:
         return len(self.dofs)
 
     def forward(self, q: ArrayLike) -> Array:
-        """Place every body (env-format section 9.4).
+        """Place every body.
 
         Args:
             q: Configurations, (..., dim).
@@ -69,14 +77,9 @@ class RobotKinematics:
 
     def step(self, k: int, q: ArrayLike) -> Array:
         """Return the pose of a connection's next body in its previous one's frame, (..., 4, 4)."""
-        values = np.asarray(q, dtype=np.float64)
         connection = self.multibody.connections[k]
-        dh = connection.dh
-        alpha, d, theta = (
-            self._value(k, kind, values, default)
-            for kind, default in ((DofKind.ALPHA, dh.alpha), (DofKind.D, dh.d), (DofKind.THETA, dh.theta))
-        )
-        row = dh_matrix(self.multibody.dh_form, alpha, dh.a, d, theta)
+        alpha, d, theta = self._dh_values(k, np.asarray(q, dtype=np.float64))
+        row = dh_matrix(self.multibody.dh_form, alpha, connection.dh.a, d, theta)
         return pose_matrix(connection.to_dh) @ row @ pose_matrix(connection.to_body)
 
     def joint_frames(self, k: int, q: ArrayLike) -> dict[DofKind, Array]:
@@ -84,23 +87,16 @@ class RobotKinematics:
 
         Theta turns about z and d slides along z of its frame, alpha turns about x.
         """
-        values = np.asarray(q, dtype=np.float64)
-        connection, dh = self.multibody.connections[k], self.multibody.connections[k].dh
-        alpha = float(self._value(k, DofKind.ALPHA, values, dh.alpha))
-        theta = float(self._value(k, DofKind.THETA, values, dh.theta))
-        d = float(self._value(k, DofKind.D, values, dh.d))
-        start = pose_matrix(connection.to_dh)
+        connection = self.multibody.connections[k]
+        alpha, d, theta = self._dh_values(k, np.asarray(q, dtype=np.float64))
+        start, a = pose_matrix(connection.to_dh), connection.dh.a
 
-        def after(alpha: float, a: float, d: float, theta: float) -> Array:
+        def after(alpha: ArrayLike, a: float, d: ArrayLike, theta: ArrayLike) -> Array:
             return start @ dh_matrix(self.multibody.dh_form, alpha, a, d, theta)
 
         if self.multibody.dh_form is DHForm.CRAIG:
-            return {
-                DofKind.ALPHA: start,
-                DofKind.THETA: after(alpha, dh.a, 0, 0),
-                DofKind.D: after(alpha, dh.a, 0, theta),
-            }
-        return {DofKind.THETA: start, DofKind.D: after(0, 0, 0, theta), DofKind.ALPHA: after(0, dh.a, d, theta)}
+            return {DofKind.ALPHA: start, DofKind.THETA: after(alpha, a, 0, 0), DofKind.D: after(alpha, a, 0, theta)}
+        return {DofKind.THETA: start, DofKind.D: after(0, 0, 0, theta), DofKind.ALPHA: after(0, a, d, theta)}
 
     def loop_gaps(self, q: ArrayLike, radii: Sequence[float]) -> Array:
         """Return how far each loop is from closed, (..., nloops).
@@ -114,15 +110,11 @@ class RobotKinematics:
         for n, k in enumerate(self.tree.loops):
             connection = self.multibody.connections[k]
             expected = poses[..., connection.previous, :, :] @ self.step(k, values)
-            apart = inverse(expected) @ poses[..., connection.next, :, :]
-            cosine = np.clip((np.trace(apart[..., :3, :3], axis1=-2, axis2=-1) - 1) / 2, -1, 1)
-            # A point at distance r from the axis of a turn by w moves by 2 r sin(w / 2).
-            turn = 2 * radii[connection.next] * np.sqrt((1 - cosine) / 2)
-            gaps[..., n] = np.linalg.norm(apart[..., :3, 3], axis=-1) + turn
+            gaps[..., n] = pose_gaps(poses[..., connection.next, :, :], expected, radii[connection.next])
         return gaps
 
     def home(self, log: DiagnosticLog | None = None) -> Array:
-        """Return the configuration that the file describes, (dim,) (design: section 4).
+        """Return the configuration that the file describes, (dim,).
 
         Joint values are reduced by whole turns, then clipped to their limits, each clipping with a diagnostic.
         """
@@ -169,8 +161,8 @@ class RobotKinematics:
             if pose is None or self.multibody.dialect is not Dialect.A:
                 return 0.0
             if dof.kind.is_length:
-                return pose.position[_POSITIONS.index(dof.kind)]
-            return float(wrap(pose.rotation[_ROTATIONS.index(dof.kind)]))
+                return pose.position[POSITIONS.index(dof.kind)]
+            return float(wrap(pose.rotation[ROTATIONS.index(dof.kind)]))
         dh = self.multibody.connections[dof.connection].dh
         value = {DofKind.THETA: dh.theta, DofKind.ALPHA: dh.alpha, DofKind.D: dh.d}[dof.kind]
         return value if dof.kind.is_length else float(wrap(value))
@@ -181,16 +173,22 @@ class RobotKinematics:
             return pose_matrix(self.multibody.bodies[body].pose)
         zeros = np.zeros(q.shape[:-1])
         value = {d.kind: q[..., i] for i, d in enumerate(self.dofs) if d.connection is None and d.body == body}
-        rotation = rotation_matrix(*(value.get(k, zeros) for k in _ROTATIONS))
-        return transform(rotation, np.stack([value.get(k, zeros) for k in _POSITIONS], axis=-1))
+        rotation = rotation_matrix(*(value.get(k, zeros) for k in ROTATIONS))
+        return transform(rotation, np.stack([value.get(k, zeros) for k in POSITIONS], axis=-1))
 
     @lasting
     def _columns(self) -> dict[tuple[int, DofKind], int]:
         return {(d.connection, d.kind): i for i, d in enumerate(self.dofs) if d.connection is not None}
 
-    def _value(self, k: int, kind: DofKind, q: Array, default: float) -> Array:
-        column = self._columns.get((k, kind))
-        return np.asarray(default) if column is None else q[..., column]
+    def _dh_values(self, k: int, q: Array) -> tuple[Array, Array, Array]:
+        """Return alpha, d and theta of a connection: the file's, but where a degree of freedom replaces one."""
+
+        def value(kind: DofKind, default: float) -> Array:
+            column = self._columns.get((k, kind))
+            return np.asarray(default) if column is None else q[..., column]
+
+        dh = self.multibody.connections[k].dh
+        return value(DofKind.ALPHA, dh.alpha), value(DofKind.D, dh.d), value(DofKind.THETA, dh.theta)
 
     def _arm(self, k: int, slide: Sequence[float]) -> float:
         """Length of the way from a connection's DH frame to the origin of its next body."""
@@ -218,3 +216,50 @@ class RobotKinematics:
 
 def _norm(pose: Pose) -> float:
     return float(np.linalg.norm(pose.position))
+
+
+def configuration_of_poses(robot: RobotKinematics, poses: Array) -> Array:
+    """Return the configurations that put bodies where they are, (..., dim).
+
+    A base is read off its pose. A joint is read off the poses of the two bodies that its connection joins, so that an
+    error of one pose does not travel along the chain; loop-closing joints are read off in the same way. Poses that no
+    configuration has give the values that turn and slide the bodies nearest to them, joint by joint.
+
+    Args:
+        robot: The robot.
+        poses: World poses of its bodies in file order, (..., nbodies, 4, 4).
+    """
+    q = np.zeros((*poses.shape[:-3], robot.dim))
+    rows = {k: _joint_values(robot, k, poses) for k in {d.connection for d in robot.dofs} if k is not None}
+    bases = {b: _base_values(poses[..., b, :, :]) for b in {d.body for d in robot.dofs if d.connection is None}}
+    for i, dof in enumerate(robot.dofs):
+        q[..., i] = bases[dof.body][dof.kind] if dof.connection is None else rows[dof.connection][dof.kind]
+    return q
+
+
+def _base_values(pose: Array) -> dict[DofKind, Array]:
+    angles = angles_from_quaternion(quaternion_from_matrix(pose[..., :3, :3]))
+    positions = np.moveaxis(pose[..., :3, 3], -1, 0)
+    return {**dict(zip(POSITIONS, positions, strict=True)), **dict(zip(ROTATIONS, angles, strict=True))}
+
+
+def _joint_values(robot: RobotKinematics, k: int, poses: Array) -> dict[DofKind, Array]:
+    """Return theta, alpha and d of a connection between bodies at some poses."""
+    connection = robot.multibody.connections[k]
+    between = inverse(poses[..., connection.previous, :, :]) @ poses[..., connection.next, :, :]
+    row = inverse(pose_matrix(connection.to_dh)) @ between @ inverse(pose_matrix(connection.to_body))
+    craig = robot.multibody.dh_form is DHForm.CRAIG
+    moves_alpha = any(d.connection == k and d.kind is DofKind.ALPHA for d in robot.dofs)
+    if not moves_alpha:
+        alpha = np.full(row.shape[:-2], connection.dh.alpha)
+    elif craig:
+        alpha = np.arctan2(-row[..., 1, 2], row[..., 2, 2])
+    else:
+        alpha = np.arctan2(row[..., 2, 1], row[..., 2, 2])
+    back = rotation_matrix(-alpha, np.zeros_like(alpha), np.zeros_like(alpha))
+    turn = back @ row[..., :3, :3] if craig else row[..., :3, :3] @ back
+    # Both columns count, so that rounding of one does not.
+    theta = np.arctan2(turn[..., 1, 0] - turn[..., 0, 1], turn[..., 0, 0] + turn[..., 1, 1])
+    offset = row[..., :3, 3]
+    d = (back @ offset[..., None])[..., 2, 0] if craig else offset[..., 2]
+    return {DofKind.THETA: theta, DofKind.ALPHA: alpha, DofKind.D: d}

@@ -1,22 +1,39 @@
-"""The configuration space of a scene: the planner's numbers, all robots one after the other."""
+"""The configuration space of a scene: the planner's numbers, all robots one after the other, and MuJoCo's qpos.
+
+In qpos robots stand in order, bodies depth first, joints in the order of the chain.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model.dialects import RULES
-from ..model.environment import Boundary, Task
+from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
 from .forward import RobotKinematics
-from .qpos import Slot, layout
 from .transforms import Array, angles_from_quaternion, quaternion_from_angles, wrap
-from .tree import DofKind
+from .tree import POSITIONS, DofKind
 
-_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
-_POSITIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """Where a joint or free base of one body stands in MuJoCo's qpos.
+
+    Attributes:
+        body: Index of the body in its robot.
+        columns: Columns of the configuration that it takes: six for a free base, else one.
+        address: Its first entry in qpos.
+        free: Whether it is a free joint: position and quaternion.
+    """
+
+    body: int
+    columns: tuple[int, ...]
+    address: int
+    free: bool
 
 
 class ConfigurationSpace:
@@ -65,10 +82,10 @@ class ConfigurationSpace:
             dtype=np.float64,
         )
         base = [d.kind if d.connection is None and d.kind.is_length else None for d in dofs]
-        self._axis = np.array([-1 if k is None else _POSITIONS.index(k) for k in base], dtype=np.int64)
+        self._axis = np.array([-1 if k is None else POSITIONS.index(k) for k in base], dtype=np.int64)
         self._is_length = np.array([d.kind.is_length for d in dofs], dtype=bool)
         self._bound_bases(boundary)
-        self._slots, self.nq = layout(robots, self.robot_slices)
+        self._slots, self.nq = _layout(robots, self.robot_slices)
         self._sample_box = sample_box
         for array in (self.lower, self.upper, self.periodic, self.home, self._units):
             array.setflags(write=False)
@@ -185,7 +202,7 @@ class ConfigurationSpace:
         Periodic degrees of freedom go the short way round; the last row equals q1 up to whole turns.
 
         Raises:
-            ValueError: n is below 2, or q0 or q1 is no configuration.
+            ValueError: n is below 2, or q0 or q1 is not a configuration.
         """
         if n < 2:
             raise ValueError(f"n is {n}; expected at least 2, for both ends")
@@ -244,3 +261,55 @@ def _unit(quaternion: Array) -> Array:
     """Return unit quaternions; the zero quaternion counts as no rotation, as in MuJoCo."""
     norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
     return np.where(norm > 0, quaternion / np.where(norm > 0, norm, 1.0), (1.0, 0.0, 0.0, 0.0))
+
+
+def children_first_to_last(robot: RobotKinematics, body: int | None) -> list[int]:
+    """Return the bodies that hang on a body, or the roots for None, in the order in which MJCF lists them."""
+    if body is None:
+        return sorted(robot.tree.bases)
+    connections = robot.multibody.connections
+    return [i for i, k in enumerate(robot.tree.parent) if k is not None and connections[k].previous == body]
+
+
+def joint_kinds(robot: RobotKinematics, connection: int) -> tuple[DofKind, ...]:
+    """Return a connection's joints in the order of the chain, as MJCF lists them.
+
+    Craig's DH turns by alpha before theta, the standard form by theta before alpha.
+    """
+    joint = robot.multibody.connections[connection].joint
+    if joint is JointType.SPHERICAL:
+        craig = robot.multibody.dh_form is DHForm.CRAIG
+        return (DofKind.ALPHA, DofKind.THETA) if craig else (DofKind.THETA, DofKind.ALPHA)
+    kinds = {JointType.REVOLUTE: DofKind.THETA, JointType.PRISMATIC: DofKind.D}
+    return (kinds[joint],) if joint in kinds else ()
+
+
+def _layout(robots: Sequence[RobotKinematics], slices: Sequence[slice]) -> tuple[tuple[tuple[Slot, ...], ...], int]:
+    """Lay the joints out in qpos: robots in order, bodies depth first."""
+    laid: list[tuple[Slot, ...]] = []
+    address = 0
+    for robot, columns in zip(robots, slices, strict=True):
+        slots: list[Slot] = []
+        for body, kinds, free in _joints_depth_first(robot):
+            where = {(d.connection, d.kind): columns.start + i for i, d in enumerate(robot.dofs) if d.body == body}
+            placed_by = robot.tree.parent[body]
+            indices = tuple(where[(placed_by, kind)] for kind in kinds)
+            for group in [indices] if free else [(i,) for i in indices]:
+                slots.append(Slot(body, group, address, free))
+                address += 7 if free else 1
+        laid.append(tuple(slots))
+    return tuple(laid), address
+
+
+def _joints_depth_first(robot: RobotKinematics) -> Iterator[tuple[int, tuple[DofKind, ...], bool]]:
+    stack = children_first_to_last(robot, None)[::-1]
+    while stack:
+        body = stack.pop()
+        k = robot.tree.parent[body]
+        if k is None:
+            free = robot.tree.bases[body] is BaseKind.VOLUMETRIC_ROTATIONAL
+            kinds = tuple(d.kind for d in robot.dofs if d.connection is None and d.body == body)
+            yield body, kinds, free
+        else:
+            yield body, joint_kinds(robot, k), False
+        stack += children_first_to_last(robot, body)[::-1]

@@ -1,6 +1,6 @@
 """Rotations, quaternions and homogeneous transforms, batched over leading axes, in radians.
 
-Conventions (env-format section 9.1): column vectors, `p_world = R p + t`, right-handed, quaternions `w x y z`.
+Conventions (docs/format/kinematics.md): column vectors, `p_world = R p + t`, right-handed, quaternions `w x y z`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def rotation_matrix(rx: ArrayLike, ry: ArrayLike, rz: ArrayLike) -> Array:
-    """Return Rz(rz) Ry(ry) Rx(rx), shape (..., 3, 3), from angles of shape (...) (env-format section 9.2)."""
+    """Return Rz(rz) Ry(ry) Rx(rx), shape (..., 3, 3), from angles of shape (...)."""
     x, y, z = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (rx, ry, rz)))
     (cx, cy, cz), (sx, sy, sz) = (np.cos(v) for v in (x, y, z)), (np.sin(v) for v in (x, y, z))
     r = np.empty((*x.shape, 3, 3))
@@ -53,7 +53,7 @@ def inverse(t: Array) -> Array:
 
 
 def dh_matrix(form: DHForm, alpha: ArrayLike, a: ArrayLike, d: ArrayLike, theta: ArrayLike) -> Array:
-    """Return the transform (..., 4, 4) of a DH row (env-format section 9.3).
+    """Return the transform (..., 4, 4) of a DH row.
 
     Craig's `Rx(alpha) Tx(a) Rz(theta) Tz(d)` (Craig, Introduction to Robotics, eq. 3.6) or the standard
     `Rz(theta) Tz(d) Tx(a) Rx(alpha)` of Denavit and Hartenberg.
@@ -119,6 +119,23 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     q = np.take_along_axis(product, largest[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0, -q, q)
+
+
+def pose_gaps(found: Array, expected: Array, radii: ArrayLike) -> Array:
+    """Return how far bodies are from where they should be, (...).
+
+    An upper bound of the distance over a ball about each body's origin: how far that is off, and twice the radius
+    times the sine of half the turn.
+
+    Args:
+        found: Poses, (..., 4, 4).
+        expected: Where they should be, of the same shape.
+        radii: (...) greatest distance of a vertex from the origin.
+    """
+    moved = np.linalg.norm(found[..., :3, 3] - expected[..., :3, 3], axis=-1)
+    # |R1 - R2| (Frobenius) is 2 sqrt(2) sin(w / 2) for a turn by w, and keeps its digits where w is small.
+    turned = np.linalg.norm(found[..., :3, :3] - expected[..., :3, :3], axis=(-2, -1)) / np.sqrt(2)
+    return moved + turned * np.asarray(radii)
 
 
 def wrap(angle: ArrayLike) -> Array:

@@ -29,7 +29,11 @@ class DofKind(StrEnum):
     @property
     def is_length(self) -> bool:
         """Whether it is a length; else it is an angle."""
-        return self in (DofKind.X, DofKind.Y, DofKind.Z, DofKind.D)
+        return self in (*POSITIONS, DofKind.D)
+
+
+POSITIONS = (DofKind.X, DofKind.Y, DofKind.Z)
+ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +60,7 @@ class Dof:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """How the bodies of a robot hang together (env-format section 9.4).
+    """How the bodies of a robot hang together (docs/format/kinematics.md).
 
     Attributes:
         parent: For each body the index of the connection that places it; None for a root.
@@ -74,12 +78,12 @@ class Tree:
 _BASE_DOFS: dict[BaseKind, tuple[DofKind, ...]] = {
     BaseKind.PLANAR_TRANSLATIONAL: (DofKind.X, DofKind.Y),
     BaseKind.PLANAR_ROTATIONAL: (DofKind.X, DofKind.Y, DofKind.RZ),
-    BaseKind.VOLUMETRIC_TRANSLATIONAL: (DofKind.X, DofKind.Y, DofKind.Z),
-    BaseKind.VOLUMETRIC_ROTATIONAL: (DofKind.X, DofKind.Y, DofKind.Z, DofKind.RX, DofKind.RY, DofKind.RZ),
+    BaseKind.VOLUMETRIC_TRANSLATIONAL: POSITIONS,
+    BaseKind.VOLUMETRIC_ROTATIONAL: POSITIONS + ROTATIONS,
     BaseKind.FIXED: (),
 }
 
-# A spherical joint owns theta, then alpha (env-format section 9.5).
+# A spherical joint owns theta, then alpha.
 _JOINT_DOFS: dict[JointType, tuple[DofKind, ...]] = {
     JointType.REVOLUTE: (DofKind.THETA,),
     JointType.PRISMATIC: (DofKind.D,),
@@ -112,10 +116,10 @@ def build_tree(multibody: MultiBody, log: DiagnosticLog) -> Tree:
 
 
 def degrees_of_freedom(multibody: MultiBody, tree: Tree) -> tuple[Dof, ...]:
-    """List the numbers of a robot's configuration in the planner's order (env-format section 9.5)."""
+    """List the numbers of a robot's configuration in the planner's order (docs/format/kinematics.md)."""
     rules = RULES[multibody.dialect]
     dofs = [
-        Dof(kind, body, periodic=not kind.is_length, lower=_turn(kind, -1), upper=_turn(kind, 1))
+        Dof(kind, body, periodic=not kind.is_length, lower=-_unlimited(kind), upper=_unlimited(kind))
         for body in sorted(tree.bases)
         for kind in _BASE_DOFS[tree.bases[body]]
     ]
@@ -125,8 +129,8 @@ def degrees_of_freedom(multibody: MultiBody, tree: Tree) -> tuple[Dof, ...]:
     return tuple(dofs)
 
 
-def _turn(kind: DofKind, sign: int) -> float:
-    return sign * (math.inf if kind.is_length else math.pi)
+def _unlimited(kind: DofKind) -> float:
+    return math.inf if kind.is_length else math.pi
 
 
 def _adopt_stray(multibody: MultiBody, index: int, bases: dict[int, BaseKind], log: DiagnosticLog) -> None:
@@ -172,11 +176,10 @@ def _joint_order(multibody: MultiBody, tree: Tree, order: JointOrder) -> list[in
 def _joint_dofs(connection: Connection, index: int, loop: bool, periodic: bool) -> list[Dof]:
     dofs: list[Dof] = []
     for n, kind in enumerate(_JOINT_DOFS[connection.joint]):
-        angle = not kind.is_length
-        lower, upper = _turn(kind, -1), _turn(kind, 1)
+        lower, upper = -_unlimited(kind), _unlimited(kind)
         if n < len(connection.limits):
             lower, upper = connection.limits[n].lower, connection.limits[n].upper
-        dofs.append(Dof(kind, connection.next, index, loop, lower, upper, periodic and angle))
+        dofs.append(Dof(kind, connection.next, index, loop, lower, upper, periodic and not kind.is_length))
     return dofs
 
 

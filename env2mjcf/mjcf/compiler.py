@@ -46,7 +46,7 @@ class Document:
 def compile_mjcf(
     assembly: Assembly, space: ConfigurationSpace, pairs: PairTable, options: Options, log: DiagnosticLog
 ) -> Document:
-    """Compile a scene; equal input gives equal bytes (design: section 5)."""
+    """Compile a scene; equal input gives equal bytes."""
     environment = assembly.environment
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs))
     compilation.assets.plan([p.mesh for p in assembly.parts()])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ..geometry.assembly import RobotParts
-from ..kinematics.qpos import joint_kinds
+from ..kinematics.space import joint_kinds
 from ..kinematics.transforms import inverse
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
-from ..kinematics.qpos import children_first_to_last
-from ..kinematics.space import ConfigurationSpace
+from ..kinematics.space import ConfigurationSpace, children_first_to_last
 from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind
 from ..options import Options

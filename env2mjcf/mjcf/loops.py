@@ -17,7 +17,7 @@ _CLOSED = 1e-6
 
 
 def add_loops(root: Element, compilation: Compilation, log: DiagnosticLog) -> None:
-    """Append `<equality>`: sites on the connection's DH axis, joined as the joint allows (design: section 4)."""
+    """Append `<equality>`: sites on the connection's DH axis, joined as the joint allows."""
     equality = add(root, "equality")
     tolerance = _CLOSED * compilation.assembly.extent
     for robot in compilation.assembly.robots:

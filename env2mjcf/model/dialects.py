@@ -1,27 +1,40 @@
-"""How each dialect reads, as a table (env-format sections 2, 9 and 12)."""
+"""How each dialect reads and what it can say, as one table (docs/format/env.md, docs/format/kinematics.md)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from .environment import BoundaryShape, DHForm, Dialect, Environment, JointType, MultiBodyKind, Recentring
 
 
 class JointOrder(StrEnum):
-    """Which connection the n-th joint value belongs to (env-format sections 8.4 and 9.5)."""
+    """Which connection the n-th joint value belongs to (docs/format/kinematics.md)."""
 
     BODY = "body"  # A: the first backward connection of body 1, 2, ...; file order where the robot has loops
     FILE = "file"  # B to D
     PARENT_CHILD = "parent-child"  # E: sorted by (parent, child)
 
 
-@dataclass(frozen=True, slots=True)
+class SurfaceLabels(StrEnum):
+    """Whether the original reader takes a label after `Surface` (docs/format/env.md)."""
+
+    NONE = "none"
+    OPTIONAL = "optional"
+    REQUIRED = "required"
+
+
+_OBSTACLES = frozenset({MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL})
+_JOINTS = frozenset({JointType.REVOLUTE, JointType.SPHERICAL, JointType.NON_ACTUATED})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DialectRules:
-    """What differs between dialects.
+    """What differs between dialects; the defaults are those of dialect B, from which C to E grew.
 
     Attributes:
+        dialect: The dialect.
         pose_angle: Radians per unit of a pose angle.
         dh_angle: Radians per unit of a DH angle.
         configuration_angle: Radians per unit of a configuration's angle.
@@ -33,78 +46,7 @@ class DialectRules:
         keyword_case: Whether the original reader compares the case of keywords.
         plural_connections: Whether the original reader insists on `Connections`.
         needs_final_newline: Whether the original reader fails on a file that ends with its last token.
-        tests_fixed_base: Whether a robot's fixed base is tested against obstacles (section 11).
-    """
-
-    pose_angle: float
-    dh_angle: float
-    configuration_angle: float
-    dh_form: DHForm
-    connection_fields: tuple[str, ...]
-    joint_order: JointOrder
-    hinges_are_periodic: bool
-    recentring: Recentring
-    keyword_case: bool
-    plural_connections: bool
-    needs_final_newline: bool
-    tests_fixed_base: bool
-
-
-_LATER_FIELDS = ("joint", "limits", "to_dh", "dh", "to_body")
-
-
-def _later(joint_order: JointOrder, dh_form: DHForm, plural: bool) -> DialectRules:
-    return DialectRules(
-        pose_angle=math.pi / 180,
-        dh_angle=1.0,
-        configuration_angle=math.pi,
-        dh_form=dh_form,
-        connection_fields=_LATER_FIELDS,
-        joint_order=joint_order,
-        hinges_are_periodic=False,
-        recentring=Recentring.COM,
-        keyword_case=False,
-        plural_connections=plural,
-        needs_final_newline=True,
-        tests_fixed_base=True,
-    )
-
-
-RULES: dict[Dialect, DialectRules] = {
-    Dialect.A: DialectRules(
-        pose_angle=math.pi / 180,
-        dh_angle=math.pi / 180,
-        configuration_angle=2 * math.pi,
-        dh_form=DHForm.CRAIG,
-        connection_fields=("actuated", "to_body", "dh", "joint", "to_dh"),
-        joint_order=JointOrder.BODY,
-        hinges_are_periodic=True,
-        recentring=Recentring.COM,
-        keyword_case=True,
-        plural_connections=False,
-        needs_final_newline=False,
-        tests_fixed_base=False,
-    ),
-    Dialect.B: _later(JointOrder.FILE, DHForm.CRAIG, plural=False),
-    Dialect.C: _later(JointOrder.FILE, DHForm.CRAIG, plural=False),
-    Dialect.D: _later(JointOrder.FILE, DHForm.CRAIG, plural=True),
-    Dialect.E: _later(JointOrder.PARENT_CHILD, DHForm.STANDARD, plural=True),
-}
-
-
-class SurfaceLabels(StrEnum):
-    """Whether the original reader takes a label after `Surface` (env-format section 7)."""
-
-    NONE = "none"
-    OPTIONAL = "optional"
-    REQUIRED = "required"
-
-
-@dataclass(frozen=True, slots=True)
-class Vocabulary:
-    """What the original reader of a dialect takes, beyond meshes, poses and connections.
-
-    Attributes:
+        tests_fixed_base: Whether a robot's fixed base is tested against obstacles.
         boundaries: Shapes of a boundary; none where the file has no boundary.
         brackets: Whether the boundary stands in brackets.
         resolution: Fields of `Resolution`.
@@ -121,94 +63,103 @@ class Vocabulary:
             a pose, and connections have their joints in another line.
     """
 
-    boundaries: frozenset[BoundaryShape]
-    brackets: bool
-    resolution: tuple[str, ...]
-    kinds: frozenset[MultiBodyKind]
-    joints: frozenset[JointType]
-    limits: bool
-    options: bool
-    mass: bool
-    adjacencies: bool
+    dialect: Dialect
+    pose_angle: float = math.pi / 180
+    dh_angle: float = 1.0
+    configuration_angle: float = math.pi
+    dh_form: DHForm = DHForm.CRAIG
+    connection_fields: tuple[str, ...] = ("joint", "limits", "to_dh", "dh", "to_body")
+    joint_order: JointOrder = JointOrder.FILE
+    hinges_are_periodic: bool = False
+    recentring: Recentring = Recentring.COM
+    keyword_case: bool = False
+    plural_connections: bool = False
+    needs_final_newline: bool = True
+    tests_fixed_base: bool = True
+    boundaries: frozenset[BoundaryShape] = frozenset()
+    brackets: bool = False
+    resolution: tuple[str, ...] = ()
+    kinds: frozenset[MultiBodyKind] = _OBSTACLES | {MultiBodyKind.ACTIVE, MultiBodyKind.SURFACE}
+    joints: frozenset[JointType] = _JOINTS
+    limits: bool = False
+    options: bool = False
+    mass: bool = False
+    adjacencies: bool = False
     surface_labels: SurfaceLabels = SurfaceLabels.NONE
     robot_files: bool = False
     query_index: bool = True
     legacy_layout: bool = False
 
 
-_LATER_JOINTS = frozenset({JointType.REVOLUTE, JointType.SPHERICAL, JointType.NON_ACTUATED})
-_OBSTACLES = frozenset({MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL})
-_LATER_KINDS = _OBSTACLES | {MultiBodyKind.ACTIVE, MultiBodyKind.SURFACE}
-
-VOCABULARIES: dict[Dialect, Vocabulary] = {
-    Dialect.A: Vocabulary(
-        boundaries=frozenset(),
-        brackets=False,
-        resolution=(),
+_TABLE = (
+    DialectRules(
+        dialect=Dialect.A,
+        dh_angle=math.pi / 180,
+        configuration_angle=2 * math.pi,
+        connection_fields=("actuated", "to_body", "dh", "joint", "to_dh"),
+        joint_order=JointOrder.BODY,
+        hinges_are_periodic=True,
+        keyword_case=True,
+        needs_final_newline=False,
+        tests_fixed_base=False,
         kinds=_OBSTACLES | {MultiBodyKind.ACTIVE},
         joints=frozenset({JointType.REVOLUTE, JointType.PRISMATIC}),
-        limits=False,
-        options=False,
-        mass=False,
-        adjacencies=False,
         query_index=False,
         legacy_layout=True,
     ),
-    Dialect.B: Vocabulary(
-        boundaries=frozenset(),
-        brackets=False,
-        resolution=(),
-        kinds=_LATER_KINDS,
-        joints=_LATER_JOINTS,
-        limits=False,
-        options=False,
-        mass=False,
-        adjacencies=False,
-    ),
-    Dialect.C: Vocabulary(
+    DialectRules(dialect=Dialect.B),
+    DialectRules(
+        dialect=Dialect.C,
         boundaries=frozenset({BoundaryShape.BOX, BoundaryShape.SPHERE}),
-        brackets=False,
-        resolution=(),
         kinds=frozenset(MultiBodyKind),
-        joints=_LATER_JOINTS | {JointType.SMA},
+        joints=_JOINTS | {JointType.SMA},
         limits=True,
-        options=False,
-        mass=False,
-        adjacencies=False,
         surface_labels=SurfaceLabels.OPTIONAL,
     ),
-    Dialect.D: Vocabulary(
+    DialectRules(
+        dialect=Dialect.D,
+        plural_connections=True,
         boundaries=frozenset(BoundaryShape),
         brackets=True,
         resolution=("position", "position_factor", "orientation", "time", "rd"),
         kinds=frozenset(MultiBodyKind),
-        joints=_LATER_JOINTS | {JointType.SMA},
+        joints=_JOINTS | {JointType.SMA},
         limits=True,
         options=True,
         mass=True,
         adjacencies=True,
         surface_labels=SurfaceLabels.REQUIRED,
     ),
-    Dialect.E: Vocabulary(
+    DialectRules(
+        dialect=Dialect.E,
+        dh_form=DHForm.STANDARD,
+        joint_order=JointOrder.PARENT_CHILD,
+        plural_connections=True,
         boundaries=frozenset(BoundaryShape),
         brackets=True,
         resolution=("position", "orientation", "time"),
         kinds=_OBSTACLES,
-        joints=_LATER_JOINTS,
         limits=True,
         options=True,
-        mass=False,
         adjacencies=True,
         robot_files=True,
         query_index=False,
     ),
-}
+)
+RULES: dict[Dialect, DialectRules] = {rules.dialect: rules for rules in _TABLE}
+
+
+def rules_of(dialect: Dialect, semantics: str = "planner") -> DialectRules:
+    """Return a dialect's rules; `page` swaps dialect A's two transforms and takes standard DH rows."""
+    rules = RULES[dialect]
+    if semantics != "page" or dialect is not Dialect.A:
+        return rules
+    return replace(rules, connection_fields=("actuated", "to_dh", "dh", "joint", "to_body"), dh_form=DHForm.STANDARD)
 
 
 def begins_with_robot(environment: Environment) -> bool:
     """Say whether configurations in files begin with the index of their robot.
 
-    They do in some dialects (env-format section 9.6), and where there are several robots, which nothing else would tell
-    apart.
+    They do in dialects B to D, and where there are several robots, which nothing else would tell apart.
     """
-    return VOCABULARIES[environment.dialect].query_index or len(environment.robots) > 1
+    return RULES[environment.dialect].query_index or len(environment.robots) > 1

@@ -1,8 +1,7 @@
 """The scene as its file describes it: robots, obstacles, boundary, tasks.
 
-Words of the file format stay as they are (`MultiBody`, `FreeBody`, `Connection`, `DHParameters`).
-Lengths are in file units, every angle is in radians. Each value keeps the span it was read from;
-spans take no part in comparisons.
+Words of the file format stay as they are (`MultiBody`, `FreeBody`, `Connection`, `DHParameters`). Lengths are in file
+units, every angle is in radians. Each value keeps the span it was read from; spans take no part in comparisons.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ def _span() -> Any:
 
 
 class Dialect(StrEnum):
-    """The five dialects of the format (env-format section 2)."""
+    """The five dialects of the format (docs/format/env.md)."""
 
     A = "A"
     B = "B"
@@ -71,7 +70,7 @@ class JointType(StrEnum):
 
 
 class Recentring(StrEnum):
-    """What is subtracted from a mesh's vertices when it is loaded (env-format section 10.3)."""
+    """What is subtracted from a mesh's vertices when it is loaded (docs/format/meshes.md)."""
 
     COM = "COM"  # the unweighted mean of the vertex list
     SURFACE = "Surface"  # its x and z only
@@ -109,7 +108,7 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class SMAShape:
-    """The two extra numbers of an SMAJoint (env-format section 6): bar length and width."""
+    """The two extra numbers of an SMAJoint: bar length and width."""
 
     length: float
     width: float
@@ -119,7 +118,7 @@ class SMAShape:
 class Connection:
     """A connection from body `previous` to body `next`, indices into the multibody's body list.
 
-    `T_next = T_previous * to_dh * T_DH(dh) * to_body` (env-format section 9.4), whatever the order of the two
+    `T_next = T_previous * to_dh * T_DH(dh) * to_body` (docs/format/kinematics.md), whatever the order of the two
     transforms in the file.
     """
 
@@ -145,8 +144,7 @@ class Body:
         pose: World pose of a fixed body; the display pose of dialect A's first FreeBody; None where the file has none.
         recentring: What is subtracted from the mesh's vertices.
         color: RGBA in 0..1, from `-c(...)`, a `#VIZMO_COLOR` line or an XML attribute.
-        texture: File name of a texture.
-        mass: Mass given by the file.
+        texture, mass: A texture's file name, and the mass, where the file gives them.
         label: The visualiser's `#VIZMO_NAME`.
         index: Dialect A's index field, which no planner used.
     """
@@ -186,8 +184,7 @@ class MultiBody:
 
     Attributes:
         kind: Role by tag.
-        bodies: In file order.
-        connections: In file order.
+        bodies, connections: In file order.
         dialect: Which dialect's rules its numbers follow (a scene may mix an environment and a newer robot file).
         dh_form: Which product a DH row stands for.
         adjacencies: Pairs of body indices that count as connected.
@@ -232,8 +229,7 @@ class Boundary:
     Attributes:
         shape: Box or ball, 2-D or 3-D.
         lower, upper: Corners of a box, one entry per bounded axis; empty for a ball.
-        center: Centre of a ball, one entry per bounded axis; empty for a box.
-        radius: Radius of a ball.
+        center, radius: Those of a ball, the centre with one entry per bounded axis; empty and 0 for a box.
         space: `workspace`, or `cspace` where an XML file says so.
     """
 
@@ -252,9 +248,8 @@ class Resolution:
 
     Attributes:
         position: `PositionRes`, file units.
-        position_factor: `PositionResFactor`.
         orientation: `Orientation`, radians.
-        time, rd: `TimeRes`, `RDRes`.
+        position_factor, time, rd: `PositionResFactor`, `TimeRes`, `RDRes`.
         span: Where `position` stands.
     """
 
@@ -316,7 +311,7 @@ class Environment:
         comments: All comment lines.
         directory: Folder that mesh files are relative to.
         path: The file, as it was named by the caller.
-        sources: All files that it was read from, robots and queries, too; what is written replaces none of them.
+        sources: All files that it was read from, robots and queries, too; nothing that is written replaces one.
         diagnostics: What the readers found.
     """
 
@@ -338,17 +333,15 @@ class Environment:
 
     @property
     def robots(self) -> tuple[MultiBody, ...]:
-        """The robots: every Active multibody; without one, multibody 0 of a dialect A file (design: section 4)."""
+        """The robots: every Active multibody; without one, multibody 0 of a dialect A file."""
         moving = tuple(m for m in self.multibodies if m.moves)
-        if not moving and self.dialect is Dialect.A:
-            return self.multibodies[:1]
-        return moving
+        return self.multibodies[:1] if not moving and self.dialect is Dialect.A else moving
 
     @property
     def obstacles(self) -> tuple[MultiBody, ...]:
         """Everything that is neither a robot nor a Surface."""
-        robots = {id(r) for r in self.robots}
-        return tuple(m for m in self.multibodies if m.kind is not MultiBodyKind.SURFACE and id(m) not in robots)
+        others = {id(m) for m in (*self.robots, *self.surfaces)}
+        return tuple(m for m in self.multibodies if id(m) not in others)
 
     @property
     def surfaces(self) -> tuple[MultiBody, ...]:

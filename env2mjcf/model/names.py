@@ -25,7 +25,7 @@ def mesh_stem(filename: str) -> str:
 def file_stem(name: str) -> str:
     """Return a name fit for a file on every system, without an extension.
 
-    What is no part of a name, or cannot be seen, becomes `_`; names that Windows reserves, and a dot, blank or dash in
+    What no file name may hold, or cannot be seen, becomes `_`; names that Windows reserves, and a dot, blank or dash in
     front, get one before them; it has 160 bytes at most, and no dot or blank at its end.
     """
     stem = _UNFIT_IN_FILES.sub("_", _seen(name)).encode()[:_LONGEST_STEM].decode(errors="ignore").rstrip(". ")

@@ -1,4 +1,4 @@
-"""A scene in other units of length."""
+"""A scene in other units of length; apart from its dataclasses, which are read as a description of the format."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Connections in another dialect: joint types, limits, units.
 
-MERGED: Connections in the other DH form: the same pose for every value of the joint (env-format section 9.3).
+MERGED: Connections in the other DH form: the same pose for every value of the joint (docs/format/kinematics.md).
 
 MERGED: Poses as six numbers that a file can hold.
 """
@@ -34,13 +34,13 @@ def _connection(connection: Connection, robot: MultiBody, losses: Losses) -> Con
         found,
         dh=DHParameters(settled(dh.alpha, unit), dh.a, dh.d, settled(dh.theta, unit), dh.span),
         limits=_limits(found, losses),
-        actuated=connection.actuated if same else "Actuated" if losses.vocabulary.legacy_layout else None,
+        actuated=connection.actuated if same else "Actuated" if losses.rules.legacy_layout else None,
     )
 
 
 def _judge_joint(connection: Connection, losses: Losses) -> None:
     joint, dialect = connection.joint, losses.dialect
-    if joint in losses.vocabulary.joints:
+    if joint in losses.rules.joints:
         return
     if joint is JointType.PRISMATIC:
         losses.lost(
@@ -62,7 +62,7 @@ def _judge_joint(connection: Connection, losses: Losses) -> None:
 
 
 def _limits(connection: Connection, losses: Losses) -> tuple[JointLimits, ...]:
-    if losses.vocabulary.limits:
+    if losses.rules.limits:
         return written_limits(connection)
     turn = JointLimits(-math.pi, math.pi)
     narrow = next((x for x in connection.limits if x != turn), None)

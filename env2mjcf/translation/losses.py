@@ -6,7 +6,7 @@ from typing import NoReturn
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
-from ..model.dialects import RULES, VOCABULARIES, DialectRules, Vocabulary
+from ..model.dialects import RULES, DialectRules
 from ..model.environment import Dialect
 
 
@@ -24,13 +24,8 @@ class Losses:
 
     @property
     def rules(self) -> DialectRules:
-        """How the dialect reads."""
+        """How the dialect reads, and what it can express."""
         return RULES[self.dialect]
-
-    @property
-    def vocabulary(self) -> Vocabulary:
-        """What the dialect can express."""
-        return VOCABULARIES[self.dialect]
 
     def lost(self, code: str, subject: str, message: str, hint: str = "", span: Span | None = None) -> None:
         """Report what is left out or changed, while poses of links stay as they are."""

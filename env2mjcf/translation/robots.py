@@ -34,7 +34,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
     if meets_obstacles:
         _report_fixed_base(source, losses)
     _report_bases(source, losses)
-    if source.adjacencies and not losses.vocabulary.adjacencies:
+    if source.adjacencies and not losses.rules.adjacencies:
         losses.lost(
             "ENV172",
             "Adjacencies",
@@ -55,7 +55,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
         connections=connections(source, losses),
         dialect=losses.dialect,
         dh_form=losses.rules.dh_form,
-        adjacencies=source.adjacencies if losses.vocabulary.adjacencies else (),
+        adjacencies=source.adjacencies if losses.rules.adjacencies else (),
         label=None,
         actuators=(),
         robot_file=None,
@@ -64,7 +64,7 @@ def translate_robot(source: MultiBody, meets_obstacles: bool, losses: Losses) ->
 
 def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody]:
     """Yield an obstacle or a surface; dialects B to E have one multibody for each body."""
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
+    if source.dialect is losses.dialect and losses.rules.legacy_layout:
         yield replace(source, connections=connections(source, losses), dh_form=losses.rules.dh_form)
         return
     kinematics = RobotKinematics.of(source)
@@ -83,11 +83,11 @@ def translate_obstacles(source: MultiBody, losses: Losses) -> Iterator[MultiBody
 
 
 def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
-    if source.dialect is losses.dialect and losses.vocabulary.legacy_layout:
+    if source.dialect is losses.dialect and losses.rules.legacy_layout:
         return source.bodies
     bases = build_tree(source, DiagnosticLog()).bases
     bodies = [robot_body(b, bases.get(i, BaseKind.JOINT), i == 0, losses) for i, b in enumerate(source.bodies)]
-    if losses.vocabulary.legacy_layout:
+    if losses.rules.legacy_layout:
         fixed = [b.base is BaseKind.FIXED for b in bodies]
         bodies = [replace(b, index=fixed[:i].count(fixed[i])) for i, b in enumerate(bodies)]
     return tuple(bodies)
@@ -96,7 +96,7 @@ def _bodies(source: MultiBody, losses: Losses) -> tuple[Body, ...]:
 def _label(source: MultiBody, losses: Losses) -> str | None:
     if source.kind is not MultiBodyKind.SURFACE:
         return None
-    labels = losses.vocabulary.surface_labels
+    labels = losses.rules.surface_labels
     if labels is SurfaceLabels.REQUIRED and source.dialect is not losses.dialect:
         return source.label or "surface"
     if labels is not SurfaceLabels.NONE:
@@ -107,7 +107,7 @@ def _label(source: MultiBody, losses: Losses) -> str | None:
 
 
 def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
-    if source.kind in losses.vocabulary.kinds or source.kind is MultiBodyKind.ACTIVE:
+    if source.kind in losses.rules.kinds or source.kind is MultiBodyKind.ACTIVE:
         return source if source.moves else replace(source, kind=MultiBodyKind.ACTIVE)
     if source.kind is MultiBodyKind.NON_HOLONOMIC:
         losses.lost(
@@ -123,7 +123,7 @@ def _without_controls(source: MultiBody, losses: Losses) -> MultiBody:
 
 def _report_bases(source: MultiBody, losses: Losses) -> None:
     bases = [b for b in source.bodies if b.base is not BaseKind.JOINT]
-    if losses.vocabulary.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
+    if losses.rules.robot_files and source.dialect is not losses.dialect and len(bases) > 1:
         losses.lost(
             "ENV176",
             bases[1].filename,
@@ -161,10 +161,10 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
         losses: Where losses are reported.
     """
     dressed = _dressed(body, losses)
-    if not losses.vocabulary.legacy_layout:
+    if not losses.rules.legacy_layout:
         _report_home(body, base, losses)
         return replace(dressed, base=base, index=None, pose=(body.pose or Pose()) if base is BaseKind.FIXED else None)
-    # Dialect A's first FreeBody is a free base, every other one a link (env-format section 4).
+    # Dialect A's first FreeBody is a free base, every other one a link.
     free = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     if base not in (free, BaseKind.FIXED):
         losses.refuse(
@@ -182,7 +182,7 @@ def robot_body(body: Body, base: BaseKind, first: bool, losses: Losses) -> Body:
 def static_body(body: Body, pose: Pose, losses: Losses) -> Body:
     """Return the body of an obstacle or a surface."""
     dressed = _dressed(body, losses)
-    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.vocabulary.legacy_layout else None)
+    return replace(dressed, base=BaseKind.FIXED, pose=pose, index=0 if losses.rules.legacy_layout else None)
 
 
 def _dressed(body: Body, losses: Losses) -> Body:
@@ -196,12 +196,12 @@ def _dressed(body: Body, losses: Losses) -> Body:
             "rename the mesh file",
             span,
         )
-    if body.mass is not None and not losses.vocabulary.mass:
+    if body.mass is not None and not losses.rules.mass:
         losses.lost(
             "ENV170", name, f"dialect {dialect} has no masses; the mass {body.mass:g} of {name} is lost", "", span
         )
         body = replace(body, mass=None)
-    if losses.vocabulary.options:
+    if losses.rules.options:
         return body
     if body.recentring is not Recentring.COM:
         losses.refuse(

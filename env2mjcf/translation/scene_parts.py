@@ -31,14 +31,14 @@ def boundary(environment: Environment, losses: Losses) -> Boundary | None:
     """Return the boundary, or what the dialect has in its place."""
     found, dialect = environment.boundary, losses.dialect
     if found is None:
-        return _wide(environment, losses) if losses.vocabulary.boundaries else None
+        return _wide(environment, losses) if losses.rules.boundaries else None
     if found.space != "workspace":
         losses.lost("ENV177", "Boundary", f"text files bound the workspace, not the {found.space}", "", found.span)
     fitting = replace(_fitting(found, environment, losses), space="workspace")
-    flat_ball = fitting.shape is BoundaryShape.SPHERE and len(fitting.center) == 2 and not losses.vocabulary.brackets
-    if fitting.shape in losses.vocabulary.boundaries and not flat_ball:
+    flat_ball = fitting.shape is BoundaryShape.SPHERE and len(fitting.center) == 2 and not losses.rules.brackets
+    if fitting.shape in losses.rules.boundaries and not flat_ball:
         return fitting
-    if not losses.vocabulary.boundaries:
+    if not losses.rules.boundaries:
         message = "its planner takes one on the command line or in XML"
         losses.lost(
             "ENV160", "Boundary", f"dialect {dialect} has no boundary in its file; it is lost", message, found.span
@@ -52,7 +52,7 @@ def boundary(environment: Environment, losses: Losses) -> Boundary | None:
 
 def resolution(environment: Environment, losses: Losses) -> Resolution:
     """Return the step sizes that the dialect can express."""
-    found, kept = environment.resolution, losses.vocabulary.resolution
+    found, kept = environment.resolution, losses.rules.resolution
     names = ("position", "position_factor", "orientation", "time", "rd")
     given = [name for name in names if getattr(found, name) is not None]
     lost = [name for name in given if name not in kept]
@@ -70,7 +70,7 @@ def resolution(environment: Environment, losses: Losses) -> Resolution:
 def _fitting(found: Boundary, environment: Environment, losses: Losses) -> Boundary:
     """Name a boundary as the dialect does by the number of its axes."""
     axes = len(found.lower or found.center)
-    shapes = losses.vocabulary.boundaries
+    shapes = losses.rules.boundaries
     if axes == 3 or found.shape not in shapes:
         return replace(found, shape=_SOLID.get(found.shape, found.shape))
     flat = _FLAT.get(found.shape, found.shape)
@@ -141,7 +141,7 @@ class DofMap:
             value = float(configuration[old])
             if not dof.kind.is_length:
                 value *= ratio
-                # Turns go from 0 to 1, and pi units from -1 to 1 (env-format section 9.5).
+                # Turns go from 0 to 1, and pi units from -1 to 1.
                 if ratio > 1 and self.source.dofs[old].periodic:
                     value -= 2 * half_turn * math.floor(value / (2 * half_turn) + 0.5)
                     # 1.8 - 2 is not quite -0.2.

@@ -79,7 +79,7 @@ class _Robots:
     def __init__(self, environment: Environment, losses: Losses) -> None:
         sources = environment.robots
         meets = bool(environment.obstacles)
-        files = _files(environment.name, sources) if losses.vocabulary.robot_files else [None] * len(sources)
+        files = _files(environment.name, sources) if losses.rules.robot_files else [None] * len(sources)
         self.translated = tuple(
             replace(translate_robot(r, meets, losses), robot_file=f) for r, f in zip(sources, files, strict=True)
         )
@@ -110,21 +110,21 @@ def _multibodies(environment: Environment, robots: _Robots, losses: Losses) -> t
         robot = robots.get(source)
         if robot is not None:
             found.append(robot)
-        elif source.kind in losses.vocabulary.kinds:
+        elif source.kind in losses.rules.kinds:
             found += translate_obstacles(source, losses)
         else:
             found += _surface(source, losses)
-    if losses.vocabulary.robot_files:
+    if losses.rules.robot_files:
         found.sort(key=lambda m: m.robot_file is not None)
-    elif losses.vocabulary.legacy_layout and environment.dialect is not losses.dialect:
-        # Its planner moves multibody 0, whatever the tag says (env-format section 4.2).
+    elif losses.rules.legacy_layout and environment.dialect is not losses.dialect:
+        # Its planner moves multibody 0, whatever the tag says.
         found.sort(key=lambda m: not m.moves)
     return tuple(found)
 
 
 def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
     name, dialect = source.label or source.bodies[0].filename, losses.dialect
-    if not losses.vocabulary.legacy_layout:
+    if not losses.rules.legacy_layout:
         losses.lost(
             "ENV174", name, f"dialect {dialect} has no surfaces; {name}, which only is drawn, is lost", "", source.span
         )
@@ -140,7 +140,7 @@ def _surface(source: MultiBody, losses: Losses) -> list[MultiBody]:
 
 
 def _report_number(environment: Environment, losses: Losses) -> None:
-    if not losses.vocabulary.legacy_layout or environment.dialect is losses.dialect:
+    if not losses.rules.legacy_layout or environment.dialect is losses.dialect:
         return
     robots = environment.robots
     if not robots and environment.multibodies:

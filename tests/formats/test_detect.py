@@ -1,4 +1,4 @@
-"""The dialect of a file is told from its text, never from its folder or name (env-format section 2)."""
+"""The dialect of a file is told from its text, never from its folder or name (docs/format/env.md)."""
 
 from __future__ import annotations
 

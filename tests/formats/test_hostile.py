@@ -119,7 +119,7 @@ class TestTime:
         "options that are not closed": (lambda n: BOX + "1\nPassive\nx.g " + "-a(" * n, 20_000),
         "digits that are no number": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}x", 5000),
         "digits on both sides of a point": (lambda n: BOX + f"1\nPassive\nx.g {'1' * n}.{'1' * n}x", 5000),
-    }  # fmt: skip
+    }
     MAPS: ClassVar[dict[str, tuple[Callable[[int], str], int]]] = {
         "hashes": (lambda n: "#" * n, 20_000),
         "a long word": (lambda n: "x" * n + "GRAPHSTAR", 20_000),
@@ -133,7 +133,7 @@ class TestTime:
         "query": lambda w: rows_of(f"{w} 0 0\n", Limits()),
         "path": lambda w: read_path(Source.of("x", f"{PATH}1\n{w} 0 0\n"), (3,), (1,), DiagnosticLog()),
         "count of a path": lambda w: read_path(Source.of("x", f"{PATH}{w}\n0 0 0\n"), (3,), (1,), DiagnosticLog()),
-    }  # fmt: skip
+    }
 
     @staticmethod
     def grows(run: Callable[[str], object], make: Callable[[int], str], size: int) -> float:
@@ -238,8 +238,10 @@ PASSED: dict[str, tuple[str, Callable[[Reader, Limits], object]]] = {
     "connections": (
         "ENV110",
         lambda r, x: r.env(
-            BOX + "1\nActive\n3\nx.g Fixed 0 0 0 0 0 0\nx.g Joint\nx.g Joint\nConnections\n2\n"
-            + "".join(f"{i} {i + 1} NonActuated\n{'0 ' * 6}\n{'0 ' * 4}\n{'0 ' * 6}\n" for i in range(2)), x,
+            BOX
+            + "1\nActive\n3\nx.g Fixed 0 0 0 0 0 0\nx.g Joint\nx.g Joint\nConnections\n2\n"
+            + "".join(f"{i} {i + 1} NonActuated\n{'0 ' * 6}\n{'0 ' * 4}\n{'0 ' * 6}\n" for i in range(2)),
+            x,
         ),
     ),
     "name_length": ("ENV109", lambda r, x: r.env(BOX + "1\nPassive\nlong.g 0 0 0 0 0 0\n", x)),
@@ -253,7 +255,7 @@ PASSED: dict[str, tuple[str, Callable[[Reader, Limits], object]]] = {
     "scene_cells": ("GEO272", lambda r, x: r.scene(BOX + "2\nPassive\ncube.g 0 0 0 0 0 0\n" + ROBOT, x)),
     "mesh_work": ("GEO273", lambda r, x: r.scene(BOX + "1\nPassive\nloose.g 0 0 0 0 0 0\n", x)),
     "pairs": ("GEO275", lambda r, x: r.scene(BOX + "3\n" + "Passive\ncube.g 9 9 9 0 0 0\n" * 2 + ROBOT, x)),
-}  # fmt: skip
+}
 
 
 class TestLimits:
@@ -291,17 +293,17 @@ class TestLimits:
 STARVED = f"""
 import resource, sys
 import numpy as np
-from env2mjcf.errors import DiagnosticLog, Env2MjcfError
-from env2mjcf.options import Limits
-import env2mjcf
-from env2mjcf.formats.arrays import map_array
-from env2mjcf.formats.byu import read_byu
-from env2mjcf.formats.gms import read_gms
+from env2mjcf.companions.arrays import map_array
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import Env2MjcfError
 from env2mjcf.formats.lexer import parse_integer
-from env2mjcf.formats.obj import read_obj
+from env2mjcf.formats.meshes.byu import read_byu, read_gms
+from env2mjcf.formats.meshes.obj import read_obj
 from env2mjcf.formats.path import read_path
+from env2mjcf.formats.reading import read
 from env2mjcf.formats.roadmap import read_roadmap
 from env2mjcf.formats.source import Source
+from env2mjcf.limits import Limits
 in_use = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (in_use + 64 * {MEGA}, resource.RLIM_INFINITY))
 unlimited = Limits(**{{name: 10**15 for name in Limits.__slots__ if name not in ("file_bytes", "nesting")}})
@@ -315,8 +317,8 @@ for n in (10**8, 10**12, 10**14):
         lambda: read_obj(f"v 0 0 0\\nf 1 {{n}} 2\\n", "x", log, unlimited),
         lambda: read_path(source(f"VIZMO_PATH_FILE   Path Version 2012\\n1\\n{{n}}\\n0 0 0 0\\n"), (3,), (1,), log),
         lambda: read_roadmap(source(f"#####GRAPHSTART#####\\n{{n}} {{n}} {{n}}\\n0 0 0 0 {{n}}\\n"), (3,), log),
-        lambda: env2mjcf.read(sys.argv[1] + f"/bodies{{n}}.env", limits=unlimited),
-        lambda: env2mjcf.read(sys.argv[1] + f"/links{{n}}.env", limits=unlimited),
+        lambda: read(sys.argv[1] + f"/bodies{{n}}.env", limits=unlimited),
+        lambda: read(sys.argv[1] + f"/links{{n}}.env", limits=unlimited),
         lambda: map_array(sys.argv[1] + f"/rows{{n}}.npy", log),
     ):
         try:
@@ -347,7 +349,7 @@ class TestNumbers:
         "gms": lambda r, w: read_gms(f"3 {w} 0 0 1 0 0 0 1 0 1 3 0 1 2\n", "x", DiagnosticLog(), Limits()),
         "query": lambda r, w: rows_of(f"{w} 0 0\n", Limits()),
         "roadmap": lambda r, w: nodes_of(NODES.replace("0 0 0 0 0", f"0 {w} 0 0 0"), Limits()),
-    }  # fmt: skip
+    }
 
     @pytest.mark.parametrize("reader", READERS)
     @pytest.mark.parametrize("word", BAD)

@@ -1,4 +1,4 @@
-"""Dialects B to E as text (env-format sections 5 to 8): DH angles in radians, `to_dh` before `to_body`."""
+"""Dialects B to E as text: DH angles in radians, `to_dh` before `to_body`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Path files of all ages, as text (env-format section 13.2)."""
+"""Path files of all ages, as text (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -42,9 +42,7 @@ def test_dialect_a_wrote_six_decimals_and_a_blank_behind_the_count() -> None:
 def test_since_2012_the_robot_stands_in_front() -> None:
     text = f"{HEAD}2012\n1\n2\n0   -1.0000000000000000e+01    5.0000000000000000e-01 \n0 1 2\n"
     assert rows(text, 2) == [(0, (-10, 0.5)), (0, (1, 2))]
-    assert rows(f"{HEAD}2012\n1\n3\n1 1 2 3\n0 4 5\n1 6 7 8\n", 2, 3) == [
-        (1, (1, 2, 3)), (0, (4, 5)), (1, (6, 7, 8)),
-    ]  # fmt: skip
+    assert rows(f"{HEAD}2012\n1\n3\n1 1 2 3\n0 4 5\n1 6 7 8\n", 2, 3) == [(1, (1, 2, 3)), (0, (4, 5)), (1, (6, 7, 8))]
 
 
 def test_the_newest_planner_writes_no_index() -> None:
@@ -113,8 +111,14 @@ def test_an_empty_path_is_valid(links: int, end: str) -> None:
     assert (found.rows, found.lines, diagnostics) == ((), (), [])
 
 
-@pytest.mark.parametrize("head", ["VIZMO_PATH_FILE Path Version 20001125", " VIZMO_PATH_FILE   Path Version 20001125 ",
-                                  "vizmo_path_file   path version 20001125"])  # fmt: skip
+@pytest.mark.parametrize(
+    "head",
+    [
+        "VIZMO_PATH_FILE Path Version 20001125",
+        " VIZMO_PATH_FILE   Path Version 20001125 ",
+        "vizmo_path_file   path version 20001125",
+    ],
+)
 def test_a_header_with_other_blanks_or_case_is_read_with_a_warning(head: str) -> None:
     found, diagnostics = read(f"{head}\n1\n1\n1 2\n", 2)
     assert len(found.rows) == 1

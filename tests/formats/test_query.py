@@ -1,4 +1,4 @@
-"""Query files: starts, goals, robot indices, velocities, info fields and text (env-format sections 9.6 and 13.1)."""
+"""Query files: starts, goals, robot indices, velocities, info fields and text (docs/format/companions.md)."""
 
 from __future__ import annotations
 

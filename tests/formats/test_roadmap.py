@@ -1,4 +1,4 @@
-"""Roadmap files of all ages, as text (env-format section 13.3)."""
+"""Roadmap files of all ages, as text (docs/format/companions.md)."""
 
 from __future__ import annotations
 
@@ -84,8 +84,10 @@ def test_everything_that_dialect_a_wrote_is_kept() -> None:
     assert head.local_planners == ("straightline", "rotate_at_s 0.5")
     assert (head.collision_detectors, head.distance_metrics, head.seed) == (("RAPID",), ("scaledEuclidean 0.9",), "")
     assert [(n.vid, n.configuration, n.info) for n in found.nodes] == [
-        (0, (0.5, 1.5), (1, -1, -1)), (1, (2.5, 3.5), (2, -1, 0.25)), (2, (4.5, 5.5), (-1, -1, -1)),
-    ]  # fmt: skip
+        (0, (0.5, 1.5), (1, -1, -1)),
+        (1, (2.5, 3.5), (2, -1, 0.25)),
+        (2, (4.5, 5.5), (-1, -1, -1)),
+    ]
     assert found.nodes[1].edges == (Edge(0, 9, 1), Edge(2, 4, 0))
 
 
@@ -93,8 +95,9 @@ def test_later_versions_count_each_edge_at_both_ends_and_keep_the_seed() -> None
     found, diagnostics = read(V041805, 2)
     assert not diagnostics
     assert (found.header.version, found.header.seed) == ("041805", "1234")
-    assert found.nodes == tuple(type(n)(n.vid, n.robot, n.configuration, n.info, n.edges, n.line + 3)
-                                for n in read(V061300, 2)[0].nodes)  # fmt: skip
+    assert found.nodes == tuple(
+        type(n)(n.vid, n.robot, n.configuration, n.info, n.edges, n.line + 3) for n in read(V061300, 2)[0].nodes
+    )
 
 
 def test_older_versions_have_fewer_info_fields() -> None:

@@ -1,4 +1,4 @@
-"""Dialect E robot files as text (env-format section 8.2)."""
+"""Dialect E robot files as text (docs/format/env.md)."""
 
 from __future__ import annotations
 

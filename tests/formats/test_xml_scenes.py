@@ -1,4 +1,4 @@
-"""XML environments, XML robots and the planner's problem files (env-format section 8)."""
+"""XML environments, XML robots and the planner's problem files (docs/format/xml.md)."""
 
 from __future__ import annotations
 
@@ -291,9 +291,7 @@ def test_a_problem_brings_environment_robot_and_task_together(problem: Reader) -
     scene = problem(PROBLEM)
     assert (scene.name, len(scene.obstacles), [r.label for r in scene.robots]) == ("scene", 2, ["rob"])
     (task,) = scene.tasks
-    assert (task.label, task.robot, task.configurations) == (
-        "go", 0, ((1, 2, 0.1, 0.2, 0.3), (3, 4, 0.4, 0.5, 0.6)),
-    )  # fmt: skip
+    assert (task.label, task.robot, task.configurations) == ("go", 0, ((1, 2, 0.1, 0.2, 0.3), (3, 4, 0.4, 0.5, 0.6)))
     assert (scene.planner_rules.adjacent_links, scene.planner_rules.ignore_self_collision) == (1, False)
     assert not codes(scene)
 

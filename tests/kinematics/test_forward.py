@@ -41,7 +41,7 @@ def robot_of(tmp_path: Path, text: str, **options: object) -> RobotKinematics:
 
 
 def test_the_seed_robot_stands_where_the_specification_says(tmp_path: Path) -> None:
-    # env-format section 15, dialect A, angles in turns.
+    # Dialect A, angles in turns; these numbers were made without this package.
     robot = robot_of(tmp_path, SEED_ROBOT)
     units = np.array([1, 1, 1] + [2 * math.pi] * 6)
     poses = robot.forward(np.array([2, 2, 1.5, 0, 0, 0, 0.4, 0.7, 0.3]) * units)
@@ -60,7 +60,7 @@ def test_the_seed_robot_stands_where_the_specification_says(tmp_path: Path) -> N
 
 
 def test_a_later_dialect_counts_angles_in_fractions_of_pi(tmp_path: Path) -> None:
-    # env-format section 15, dialect C/D.
+    # The same robot in the words of dialects C and D.
     text = """Boundary Box [-9:9 ; -9:9 ; -9:9]
 MultiBodies
 1
@@ -89,7 +89,7 @@ Connections
 
 
 def test_the_page_reading_turns_the_other_way(tmp_path: Path) -> None:
-    """Section 16: the page's labels put the same pivot on the mirrored axis."""
+    """The page's labels put the same pivot on the mirrored axis."""
     planner, page = robot_of(tmp_path, SEED_ROBOT), robot_of(tmp_path, SEED_ROBOT, semantics="page")
     q = np.zeros(9)
     q[6] = 0.3
@@ -168,7 +168,7 @@ def test_a_prismatic_value_replaces_d(tmp_path: Path) -> None:
     assert [d.kind for d in robot.dofs[6:]] == ["d", "theta", "theta"]
     q = np.zeros(9)
     near, far = robot.forward(q), robot.forward(q + np.eye(9)[6])
-    # The DH z axis is the base's -y (env-format section 16); a metre of d is a metre of travel.
+    # The DH z axis is the base's -y (docs/format/readings.md); a metre of d is a metre of travel.
     np.testing.assert_allclose(far[1:, :3, 3] - near[1:, :3, 3], [[0, -1, 0]] * 3, atol=1e-12)
     assert robot.home()[6] == 5.0
 

@@ -54,8 +54,10 @@ def test_a_model_at_rest_is_at_home(scene: env2mjcf.Scene) -> None:
 
 
 def test_interpolation_goes_the_short_way_on_periodic_angles_only(tmp_path: Path) -> None:
-    text = free_cube(robot="2\ncube.g Planar Rotational\ncube.g Joint\nConnections\n1\n0 1 Revolute -1:1\n"
-                           "2 0 0 0 0 0  0 0 0 0  0 0 0 0 0 0\n")  # fmt: skip
+    text = free_cube(
+        robot="2\ncube.g Planar Rotational\ncube.g Joint\nConnections\n1\n0 1 Revolute -1:1\n"
+        "2 0 0 0 0 0  0 0 0 0  0 0 0 0 0 0\n"
+    )
     space = env2mjcf.load(write_scene(tmp_path, text)).space
     assert list(space.periodic) == [False, False, True, False]
     q0, q1 = np.array([0, 0, 3.0, 3.0]), np.array([1, 2, -3.0, -3.0])

@@ -1,4 +1,4 @@
-"""Rotations, quaternions and DH rows, against numbers printed in the format specification and against algebra."""
+"""Rotations, quaternions and DH rows, against numbers made without this package and against algebra."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from env2mjcf.kinematics.transforms import (
     angles_from_quaternion,
     dh_matrix,
     inverse,
+    pose_gaps,
     pose_matrix,
     quaternion_from_angles,
     quaternion_from_matrix,
     rotation_matrix,
+    transform,
     wrap,
 )
 from env2mjcf.model.environment import DHForm, Pose
@@ -30,13 +32,13 @@ def rotate(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def test_six_numbers_turn_about_fixed_axes_x_then_y_then_z() -> None:
-    # env-format section 9.2 prints this matrix.
+    # Rz(0.3) Ry(0.2) Rx(0.1), made without this package.
     expected = [[0.936293, -0.275096, 0.218351], [0.289629, 0.956425, -0.036957], [-0.198669, 0.097843, 0.975170]]
     np.testing.assert_allclose(rotation_matrix(0.1, 0.2, 0.3), expected, atol=5e-7)
 
 
 def test_a_craig_row_is_the_printed_matrix() -> None:
-    # env-format section 9.3.
+    # Craig, Introduction to Robotics, equation 3.6, with numbers put in.
     expected = [
         [0.764842, -0.644218, 0, 2],
         [0.615445, 0.730682, -0.295520, -1.477601],
@@ -51,6 +53,13 @@ def test_a_standard_row_is_the_printed_product() -> None:
     ca, sa, ct, st_ = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
     expected = [[ct, -st_ * ca, st_ * sa, a * ct], [st_, ct * ca, -ct * sa, a * st_], [0, sa, ca, d], [0, 0, 0, 1]]
     np.testing.assert_allclose(dh_matrix(DHForm.STANDARD, alpha, a, d, theta), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-4, 2.0])
+def test_the_gap_of_two_poses_keeps_its_digits_for_tiny_turns(angle: float) -> None:
+    # A point at distance r from the axis of a turn by w moves by 2 r sin(w / 2).
+    moved = transform(rotation_matrix(0, 0, angle), (3e-10, 0, 0))
+    assert pose_gaps(moved, np.eye(4), 5.0) == pytest.approx(3e-10 + 10 * math.sin(angle / 2), rel=1e-6)
 
 
 def test_the_two_forms_agree_without_twist_and_offset() -> None:

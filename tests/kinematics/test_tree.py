@@ -1,4 +1,4 @@
-"""Which numbers of a configuration there are, in which order, and what they may be (env-format section 9.5)."""
+"""Which numbers of a configuration there are, in which order, and what they may be (docs/format/kinematics.md)."""
 
 from __future__ import annotations
 

@@ -152,11 +152,22 @@ def test_a_scene_of_any_name_becomes_a_file_of_a_plain_one(stem: str, tmp_path: 
 @pytest.mark.parametrize(
     ("name", "stem"),
     [
-        ("scene", "scene"), ("maze 2", "maze 2"), ("CON", "_CON"), ("con .a", "_con .a"), ("nul.b.c", "_nul.b.c"),
-        ("console", "console"), ("..", "_"), ("../x", "_.._x"), ("-o", "_-o"), ("", "_"), ("a. .", "a"), ("a:b", "a_b"),
-        ("LPT1 ", "_LPT1"), ("\u202e\x1b\ud800", "_"),
+        ("scene", "scene"),
+        ("maze 2", "maze 2"),
+        ("CON", "_CON"),
+        ("con .a", "_con .a"),
+        ("nul.b.c", "_nul.b.c"),
+        ("console", "console"),
+        ("..", "_"),
+        ("../x", "_.._x"),
+        ("-o", "_-o"),
+        ("", "_"),
+        ("a. .", "a"),
+        ("a:b", "a_b"),
+        ("LPT1 ", "_LPT1"),
+        ("\u202e\x1b\ud800", "_"),
     ],
-)  # fmt: skip
+)
 def test_a_stem_is_fit_for_every_system(name: str, stem: str) -> None:
     assert file_stem(name) == stem
     assert file_stem(stem) == stem
@@ -267,10 +278,26 @@ def test_a_translated_scene_names_the_same_meshes_or_is_refused(mesh: str, tmp_p
 # Paths that leave the folder.
 
 OUTSIDE = (
-    "../secret.g", "sub/../../secret.g", "/etc/passwd", "{}/secret.g", "//{}/secret.g", "..\\secret.g",
-    "\\\\server\\share\\a.g", "//server/share/a.g", "C:\\x.g", "c:x.g", "file:///etc/passwd", "file://{}/secret.g",
-    "http://127.0.0.1/a.g", "link.g", "folder/secret.g", "~/a.g", "$HOME/a.g", "/dev/zero", "/proc/self/environ",
-)  # fmt: skip
+    "../secret.g",
+    "sub/../../secret.g",
+    "/etc/passwd",
+    "{}/secret.g",
+    "//{}/secret.g",
+    "..\\secret.g",
+    "\\\\server\\share\\a.g",
+    "//server/share/a.g",
+    "C:\\x.g",
+    "c:x.g",
+    "file:///etc/passwd",
+    "file://{}/secret.g",
+    "http://127.0.0.1/a.g",
+    "link.g",
+    "folder/secret.g",
+    "~/a.g",
+    "$HOME/a.g",
+    "/dev/zero",
+    "/proc/self/environ",
+)
 
 
 @pytest.mark.parametrize("name", OUTSIDE)
@@ -365,12 +392,18 @@ def glb(uri: str) -> bytes:
     views = [{"buffer": 0, "byteLength": 36}]
     accessor = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}
     head = {
-        "asset": {"version": "2.0"}, "buffers": [buffer], "bufferViews": views, "accessors": [accessor],
-        "images": [{"uri": uri}], "textures": [{"source": 0}],
+        "asset": {"version": "2.0"},
+        "buffers": [buffer],
+        "bufferViews": views,
+        "accessors": [accessor],
+        "images": [{"uri": uri}],
+        "textures": [{"source": 0}],
         "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
-        "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0,
-    }  # fmt: skip
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "scene": 0,
+    }
     text = json.dumps(head).encode()
     text += b" " * (-len(text) % 4)
     return (

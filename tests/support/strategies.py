@@ -14,7 +14,7 @@ import trimesh
 from hypothesis import strategies as st
 from meshes import voxels
 
-from env2mjcf.model.dialects import RULES, VOCABULARIES
+from env2mjcf.model.dialects import RULES
 from env2mjcf.model.environment import (
     BaseKind,
     Body,
@@ -61,18 +61,18 @@ def rich_environments() -> st.SearchStrategy[Environment]:
 
 @st.composite
 def _environments(draw: Any, dialect: Dialect, rich: bool) -> Environment:
-    vocabulary = VOCABULARIES[dialect]
+    rules = RULES[dialect]
     obstacles = draw(st.lists(_obstacles(dialect, rich), max_size=3))
     robots = [draw(_robots(dialect, rich, i)) for i in range(draw(st.integers(1, 3)) if rich else 1)]
-    multibodies = [*obstacles, *robots] if vocabulary.robot_files else [*robots, *obstacles]
-    if rich and not vocabulary.robot_files:
+    multibodies = [*obstacles, *robots] if rules.robot_files else [*robots, *obstacles]
+    if rich and not rules.robot_files:
         multibodies = draw(st.permutations(multibodies))
     return Environment(
         "scene",
         dialect,
         tuple(multibodies),
-        boundary=draw(_boundaries(vocabulary.boundaries)) if vocabulary.boundaries else None,
-        resolution=draw(_resolutions(vocabulary.resolution)) if rich else Resolution(),
+        boundary=draw(_boundaries(rules.boundaries)) if rules.boundaries else None,
+        resolution=draw(_resolutions(rules.resolution)) if rich else Resolution(),
         declared_multibodies=sum(m.robot_file is None for m in multibodies),
     )
 
@@ -101,17 +101,17 @@ def _boundaries(draw: Any, shapes: frozenset[BoundaryShape]) -> Boundary:
 
 @st.composite
 def _dressed(draw: Any, dialect: Dialect, base: BaseKind, pose: Pose | None, index: int, mass: bool = False) -> Body:
-    vocabulary = VOCABULARIES[dialect]
+    rules = RULES[dialect]
     color = draw(COLORS)
     opaque = None if color is None else (*color[:3], 1.0)
     return Body(
         draw(NAMES),
         base,
         pose,
-        draw(st.sampled_from(list(Recentring))) if vocabulary.options else Recentring.COM,
-        color if vocabulary.options else opaque,
-        draw(st.sampled_from([None, "wood.png"])) if vocabulary.options else None,
-        draw(st.none() | st.floats(0.1, 10)) if mass and vocabulary.mass else None,
+        draw(st.sampled_from(list(Recentring))) if rules.options else Recentring.COM,
+        color if rules.options else opaque,
+        draw(st.sampled_from([None, "wood.png"])) if rules.options else None,
+        draw(st.none() | st.floats(0.1, 10)) if mass and rules.mass else None,
         draw(st.sampled_from([None, "a name"])),
         index if dialect is Dialect.A else None,
     )
@@ -119,10 +119,10 @@ def _dressed(draw: Any, dialect: Dialect, base: BaseKind, pose: Pose | None, ind
 
 @st.composite
 def _obstacles(draw: Any, dialect: Dialect, rich: bool) -> MultiBody:
-    kinds = VOCABULARIES[dialect].kinds if rich else {MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL}
+    kinds = RULES[dialect].kinds if rich else {MultiBodyKind.PASSIVE, MultiBodyKind.INTERNAL}
     kind = draw(st.sampled_from(sorted(kinds - {MultiBodyKind.ACTIVE, MultiBodyKind.NON_HOLONOMIC})))
     bodies = [draw(_dressed(dialect, BaseKind.FIXED, draw(POSES), 0))]
-    if rich and VOCABULARIES[dialect].legacy_layout:
+    if rich and RULES[dialect].legacy_layout:
         bodies += [draw(_dressed(dialect, BaseKind.FIXED, draw(POSES), 1 + i)) for i in range(draw(st.integers(0, 2)))]
     labelled = kind is MultiBodyKind.SURFACE and dialect is not Dialect.B
     label = draw(st.sampled_from([None, "floor"])) if labelled else None
@@ -132,7 +132,7 @@ def _obstacles(draw: Any, dialect: Dialect, rich: bool) -> MultiBody:
 @st.composite
 def _robots(draw: Any, dialect: Dialect, rich: bool, number: int) -> MultiBody:
     """Draw a tree, in which each link hangs on an earlier body; a rich one has more bases, and closed loops."""
-    vocabulary = VOCABULARIES[dialect]
+    rules = RULES[dialect]
     legacy = dialect is Dialect.A
     fixed = draw(st.booleans())
     free = BaseKind.VOLUMETRIC_ROTATIONAL if legacy else draw(st.sampled_from(FREE))
@@ -156,12 +156,12 @@ def _robots(draw: Any, dialect: Dialect, rich: bool, number: int) -> MultiBody:
         tuple(connections),
         dialect=dialect,
         dh_form=RULES[dialect].dh_form,
-        robot_file=f"{number}.robot" if vocabulary.robot_files else None,
+        robot_file=f"{number}.robot" if rules.robot_files else None,
     )
-    if rich and vocabulary.adjacencies:
+    if rich and rules.adjacencies:
         pairs = st.tuples(*[st.integers(0, len(bodies) - 1)] * 2)
         robot = replace(robot, adjacencies=tuple(draw(st.lists(pairs, max_size=2))))
-    if rich and MultiBodyKind.NON_HOLONOMIC in vocabulary.kinds and draw(st.integers(0, 3)) == 0:
+    if rich and MultiBodyKind.NON_HOLONOMIC in rules.kinds and draw(st.integers(0, 3)) == 0:
         controls = draw(st.lists(st.tuples(LENGTHS, LENGTHS), max_size=3))
         bounds = VelocityBounds(draw(st.floats(0, 9)), draw(st.floats(0, 9)))
         robot = replace(robot, kind=MultiBodyKind.NON_HOLONOMIC, velocity_bounds=bounds, controls=tuple(controls))
@@ -170,10 +170,10 @@ def _robots(draw: Any, dialect: Dialect, rich: bool, number: int) -> MultiBody:
 
 @st.composite
 def _connections(draw: Any, dialect: Dialect, previous: int, following: int, rich: bool) -> Connection:
-    vocabulary, rules = VOCABULARIES[dialect], RULES[dialect]
-    joint = draw(st.sampled_from(sorted(vocabulary.joints if rich else vocabulary.joints - {JointType.SMA})))
+    rules = RULES[dialect]
+    joint = draw(st.sampled_from(sorted(rules.joints if rich else rules.joints - {JointType.SMA})))
     angles = st.floats(-3, 3).map(lambda x: x * rules.dh_angle)
-    count = {JointType.REVOLUTE: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}.get(joint, 0) if vocabulary.limits else 0
+    count = {JointType.REVOLUTE: 1, JointType.SPHERICAL: 2, JointType.SMA: 1}.get(joint, 0) if rules.limits else 0
     return Connection(
         previous,
         following,

@@ -1,7 +1,4 @@
-"""MOVIE.BYU `.g` meshes, in the shape of a trimesh loader (env-format section 10.1).
-
-MERGED: GMS `.dat` meshes of the oldest planner (env-format section 10.1, last line).
-"""
+"""MOVIE.BYU `.g` meshes, also for trimesh, and the GMS `.dat` meshes of the oldest planner (docs/format/meshes.md)."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from ...diagnostics import DiagnosticLog
 from ...errors import GeometryError
 from ...limits import Limits
 from .numbers import Numbers, column_layouts, find_numbers
-from .text import MeshArrays, NumberFile, as_bytes, faces_of
+from .text import MeshArrays, NumberFile, as_bytes
 
 _HEADER = ("the number of parts", "the number of vertices", "the number of polygons", "the number of edges")
 
@@ -53,7 +50,7 @@ def read_byu(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
         All (n, 3) vertices in file order, and (m, 3) triangles.
 
     Raises:
-        GeometryError: The file is no BYU mesh, is cut off, has numbers left over or an index out of range.
+        GeometryError: The file is not a BYU mesh, is cut off, has numbers left over or an index out of range.
     """
     numbers = find_numbers(as_bytes(text), fortran=True)
     try:
@@ -94,16 +91,7 @@ def _read(file: NumberFile) -> MeshArrays:
     corners, counts, first = _polygons(file, 4 + 2 * parts + 3 * n_vertices, n_vertices, n_polygons)
     _check_header(file, n_edges, ranges.reshape(-1, 2), n_polygons, len(corners))
     starts = np.cumsum(counts) - counts
-    faces = faces_of(
-        vertices,
-        corners,
-        counts,
-        file.path,
-        file.log,
-        limits=file.limits,
-        place=lambda k: file.span(first + int(starts[k])),
-    )
-    return vertices, faces
+    return vertices, file.faces(vertices, corners, counts, lambda k: file.span(first + int(starts[k])))
 
 
 def _polygons(
@@ -122,21 +110,13 @@ def _polygons(
     bad = np.flatnonzero((indices == 0) | (np.abs(indices) > n_vertices))
     if bad.size:
         token = first + int(bad[0])
-        file.fail(
-            "GEO214",
-            token,
-            f"{what(token)} is vertex {file.numbers.text(token)}; expected 1 to {n_vertices}, "
-            "negative at the last corner",
-        )
+        found = f"{what(token)} is vertex {file.numbers.text(token)}"
+        file.fail("GEO214", token, f"{found}; expected 1 to {n_vertices}, negative at the last corner")
     if missing:
         file.need(last + 1, what)
     if len(indices) > file.limits.mesh_elements:
-        file.fail(
-            "GEO209",
-            first,
-            f"the polygons have {len(indices)} corners; at most {file.limits.mesh_elements} are read",
-            hint=Limits.hint("mesh_elements"),
-        )
+        message = f"the polygons have {len(indices)} corners; at most {file.limits.mesh_elements} are read"
+        file.fail("GEO209", first, message, Limits.hint("mesh_elements"))
     file.nothing_after(last, f"the last of {n_polygons} polygons")
     return np.abs(indices) - 1, np.diff(ends[:n_polygons], prepend=-1), first
 
@@ -145,27 +125,19 @@ def _check_header(file: NumberFile, n_edges: int, ranges: NDArray[np.int64], n_p
     """Report what no reader used and real files get wrong, and parts, which dialect A's reader gets wrong."""
     if len(ranges) != 1:
         # A fault in dialect A alone, whose reader is gone: later readers take any number of parts.
-        file.log.info(
-            "GEO219",
-            file.path,
+        message = (
             f"{len(ranges)} parts, read as one mesh; dialect A's planner reads one range whatever the header says, "
-            "and so misreads this file",
-            hint="write the mesh as a single part",
-            span=file.span(0),
+            "and so misreads this file"
         )
+        file.log.info("GEO219", file.path, message, hint="write the mesh as a single part", span=file.span(0))
     if n_edges != n_corners:
-        file.log.info(
-            "GEO217", file.path, f"the header says {n_edges} edges; the polygons have {n_corners}", span=file.span(3)
-        )
+        message = f"the header says {n_edges} edges; the polygons have {n_corners}"
+        file.log.info("GEO217", file.path, message, span=file.span(3))
     covers = len(ranges) > 0 and ranges[0, 0] == 1 and ranges[-1, 1] == n_polygons
     if len(ranges) and not (covers and (ranges[1:, 0] == ranges[:-1, 1] + 1).all()):
-        said = ", ".join(f"{a} to {b}" for a, b in ranges[:4].tolist())
-        file.log.info(
-            "GEO218",
-            file.path,
-            f"the parts are polygons {said}{', ...' if len(ranges) > 4 else ''}; the file has 1 to {n_polygons}",
-            span=file.span(4),
-        )
+        said = ", ".join([*(f"{a} to {b}" for a, b in ranges[:4].tolist()), *["..."][: len(ranges) > 4]])
+        message = f"the parts are polygons {said}; the file has 1 to {n_polygons}"
+        file.log.info("GEO218", file.path, message, span=file.span(4))
 
 
 def load_byu(file_obj: IO[str] | IO[bytes], **kwargs: Any) -> dict[str, Any]:
@@ -232,4 +204,4 @@ def read_gms(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     file.nothing_after(first + at, f"the last of {n_polygons} polygons")
     counts = np.diff(np.array([*starts, first + at], dtype=np.int64)) - 1
     indices = np.array(corners, dtype=np.int64)
-    return vertices, faces_of(vertices, indices, counts, path, log, limits=limits, place=lambda k: file.span(starts[k]))
+    return vertices, file.faces(vertices, indices, counts, lambda k: file.span(starts[k]))

@@ -122,7 +122,7 @@ def _token_chunks(text: bytes) -> Iterator[list[bytes]]:
 
 
 def _converted(tokens: list[bytes], plain: bool) -> NDArray[np.float64]:
-    """Return the values of the tokens in front of the first that is no finite number."""
+    """Return the values of the tokens in front of the first that is not a finite number."""
     if plain:
         try:
             values = np.array(tokens, dtype=np.float64)

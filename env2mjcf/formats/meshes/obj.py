@@ -1,7 +1,7 @@
-"""Wavefront `.obj` meshes: the raw vertex list, and all faces as one mesh (env-format section 10.2).
+"""Wavefront `.obj` meshes: the raw vertex list, and all faces as one mesh (docs/format/meshes.md).
 
 trimesh drops vertices that no face uses and splits others at texture seams. The planner's origin is the mean of the
-raw list (section 10.3), so that the list has to be read as it stands.
+raw list, so that the list has to be read as it stands.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ...diagnostics import DiagnosticLog
 from ...errors import Span
 from ...limits import Limits
 from .numbers import find_numbers, span_of
-from .text import MeshArrays, NumberFile, as_bytes, faces_of
+from .text import MeshArrays, NumberFile, as_bytes
 
 _CONTINUATION = re.compile(rb"\\(?:\r\n|\r|\n)")
 _LINE = re.compile(rb"^[ \t]*([^\s#]+)([^\n#]*)", re.MULTILINE)
@@ -23,10 +23,9 @@ _LINE = re.compile(rb"^[ \t]*([^\s#]+)([^\n#]*)", re.MULTILINE)
 _REFERENCES = re.compile(rb"(?<=\d)/\S*")
 
 # Names, groups, materials, drawing and texture: none of it is geometry.
-_NO_GEOMETRY = {
-    "vt", "vn", "vp", "g", "o", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "bevel", "c_interp", "d_interp",
-    "lod", "shadow_obj", "trace_obj",
-}  # fmt: skip
+_NO_GEOMETRY = re.compile(
+    rb"vt|vn|vp|g|o|s|mg|usemtl|mtllib|usemap|maplib|bevel|c_interp|d_interp|lod|shadow_obj|trace_obj"
+)
 
 
 class _Rows(NumberFile):
@@ -42,14 +41,7 @@ class _Rows(NumberFile):
     """
 
     def __init__(
-        self,
-        extents: list[tuple[int, int]],
-        plain: bytes,
-        whole: bytes,
-        *,
-        path: str,
-        log: DiagnosticLog,
-        limits: Limits,
+        self, extents: list[tuple[int, int]], plain: bytes, whole: bytes, path: str, log: DiagnosticLog, limits: Limits
     ) -> None:
         text = b"\n".join(plain[a:b] for a, b in extents)
         super().__init__(find_numbers(_REFERENCES.sub(_blanks, text)), path, log, limits)
@@ -60,12 +52,8 @@ class _Rows(NumberFile):
         self.row = np.searchsorted(self._begins, self.numbers.starts, side="right") - 1
         self.counts = np.bincount(self.row, minlength=len(extents)).astype(np.int64)
         if len(self.row) > 3 * limits.mesh_elements:
-            log.fail(
-                "GEO209",
-                path,
-                f"{path} has {len(self.row)} numbers; at most {limits.mesh_elements} vertices or corners are read",
-                hint=Limits.hint("mesh_elements"),
-            )
+            message = f"{path} has {len(self.row)} numbers; at most {limits.mesh_elements} vertices or corners are read"
+            log.fail("GEO209", path, message, hint=Limits.hint("mesh_elements"))
 
     def span(self, token: int) -> Span:
         """Return the place of a token in the file."""
@@ -112,13 +100,13 @@ def read_obj(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
             extents[keyword].append(line.span(2))
             if keyword == b"f":
                 vertices_before.append(len(extents[b"v"]))
-        elif unknown is None and keyword.decode("latin-1") not in _NO_GEOMETRY:
+        elif unknown is None and not _NO_GEOMETRY.fullmatch(keyword):
             unknown = line.span(1)
     if unknown is not None:
         found = whole[unknown[0] : unknown[1]][:40].decode("utf-8", "replace")
         message = f"lines that begin with {found!r} are not read; only vertices `v` and faces `f` are"
         log.warn("GEO225", path, message, span=span_of(path, whole, *unknown))
-    rows = {k: _Rows(x, plain, whole, path=path, log=log, limits=limits) for k, x in extents.items()}
+    rows = {k: _Rows(x, plain, whole, path, log, limits) for k, x in extents.items()}
     vertices = _vertices(rows[b"v"])
     return vertices, _faces(rows[b"f"], np.array(vertices_before, dtype=np.int64), vertices)
 
@@ -165,10 +153,6 @@ def _faces(rows: _Rows, vertices_before: NDArray[np.int64], vertices: NDArray[np
         rows.fail("GEO214", token, message, hint)
     negative = np.flatnonzero(indices < 0)
     if negative.size:
-        rows.log.warn(
-            "GEO224",
-            rows.path,
-            "negative indices count back from the last vertex; the original planner does not read them",
-            span=rows.span(int(negative[0])),
-        )
-    return faces_of(vertices, corners, rows.counts, rows.path, rows.log, limits=rows.limits, place=rows.row_span)
+        message = "negative indices count back from the last vertex; the original planner does not read them"
+        rows.log.warn("GEO224", rows.path, message, span=rows.span(int(negative[0])))
+    return rows.faces(vertices, corners, rows.counts, rows.row_span)

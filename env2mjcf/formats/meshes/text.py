@@ -1,4 +1,4 @@
-"""What the text formats of meshes share: how numbers are taken, what is checked, what is said."""
+"""What the text formats of meshes share: how numbers are taken, what is checked, polygons as triangles."""
 
 from __future__ import annotations
 
@@ -95,12 +95,8 @@ class NumberFile:
         if value == 0:
             self.fail("GEO210", token, f"{what} is 0: the mesh is empty", hint="expected at least one triangle")
         if value > self.limits.mesh_elements:
-            self.fail(
-                "GEO209",
-                token,
-                f"{what} is {self.numbers.text(token)}; at most {self.limits.mesh_elements} are read",
-                hint=Limits.hint("mesh_elements"),
-            )
+            message = f"{what} is {self.numbers.text(token)}; at most {self.limits.mesh_elements} are read"
+            self.fail("GEO209", token, message, Limits.hint("mesh_elements"))
         return value
 
     def points(self, first: int, count: int) -> NDArray[np.float64]:
@@ -117,76 +113,62 @@ class NumberFile:
         """Make sure that the file ends in front of a token."""
         left = len(self.numbers.starts) - token
         if left > 0:
-            self.fail(
-                "GEO215",
-                token,
-                f"{left} more words behind {expected}, first {_short(self.numbers.text(token))}; expected the end "
-                "of the file",
-                hint="do the counts of the header fit the file?",
+            found = f"{left} more words behind {expected}, first {_short(self.numbers.text(token))}"
+            hint = "do the counts of the header fit the file?"
+            self.fail("GEO215", token, f"{found}; expected the end of the file", hint)
+
+    def faces(
+        self,
+        vertices: NDArray[np.float64],
+        corners: NDArray[np.int64],
+        counts: NDArray[np.int64],
+        place: Callable[[int], Span],
+    ) -> NDArray[np.int64]:
+        """Cut the file's polygons into triangles and say where they are more, or less, than triangles.
+
+        Args:
+            vertices: (n, 3) points.
+            corners: Valid indices into `vertices`, polygon after polygon.
+            counts: Number of corners of each polygon.
+            place: Where a polygon stands in the file.
+        """
+        path, log, limits = self.path, self.log, self.limits
+        if counts.size and counts.max() > limits.polygon_corners:
+            worst = int(counts.argmax())
+            message = f"a polygon has {counts[worst]} corners; at most {limits.polygon_corners} are read"
+            hint = f"triangulate the mesh, or {Limits.hint('polygon_corners')}"
+            log.fail("GEO227", path, message, hint=hint, span=place(worst))
+        small = np.flatnonzero(counts < 3)
+        if small.size:
+            message = f"{small.size} of {counts.size} polygons have fewer than three corners; skipped"
+            log.warn("GEO221", path, message, span=place(int(small[0])))
+        large = np.flatnonzero(counts > 3)
+        if large.size:
+            message = (
+                f"{large.size} of {counts.size} polygons have more than three corners; cut into triangles, where the "
+                "original planner collides only the first three corners (dialect A, .obj) or refuses the file (.g, "
+                "B to E)"
             )
-
-
-def faces_of(
-    vertices: NDArray[np.float64],
-    corners: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    path: str,
-    log: DiagnosticLog,
-    *,
-    limits: Limits,
-    place: Callable[[int], Span],
-) -> NDArray[np.int64]:
-    """Cut a file's polygons into triangles and say where they are more, or less, than triangles.
-
-    Args:
-        vertices: (n, 3) points.
-        corners: Valid indices into `vertices`, polygon after polygon.
-        counts: Number of corners of each polygon.
-        path: The file, for messages.
-        log: Where findings go.
-        limits: Bounds on hostile input.
-        place: Where a polygon stands in the file.
-    """
-    if counts.size and counts.max() > limits.polygon_corners:
-        worst = int(counts.argmax())
-        message = f"a polygon has {counts[worst]} corners; at most {limits.polygon_corners} are read"
-        hint = f"triangulate the mesh, or {Limits.hint('polygon_corners')}"
-        log.fail("GEO227", path, message, hint=hint, span=place(worst))
-    small = np.flatnonzero(counts < 3)
-    if small.size:
-        message = f"{small.size} of {counts.size} polygons have fewer than three corners; skipped"
-        log.warn("GEO221", path, message, span=place(int(small[0])))
-    large = np.flatnonzero(counts > 3)
-    if large.size:
-        log.warn(
-            "GEO220",
-            path,
-            f"{large.size} of {counts.size} polygons have more than three corners; cut into triangles, where the "
-            "original planner collides only the first three corners (dialect A, .obj) or refuses the file (.g, B to E)",
-            hint="triangulate the mesh",
-            span=place(int(large[0])),
-        )
-    kept = np.flatnonzero(counts >= 3)
-    if not kept.size:
-        log.fail("GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
-    try:
-        faces, crossing = triangulate(
-            vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], Work(limits.polygon_work)
-        )
-    except TooMuchWorkError as stopped:
-        worst = int(kept[stopped.part])
-        log.fail(
-            "GEO270",
-            path,
-            f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have to "
-            f"be looked at; this polygon has {counts[worst]} corners and is not convex",
-            hint=f"triangulate the mesh, or {Limits.hint('polygon_work')}",
-            span=place(worst),
-        )
-    if crossing:
-        message = f"{len(crossing)} polygons cross themselves; what they enclose is a guess"
-        log.warn("GEO222", path, message, span=place(int(kept[crossing[0]])))
-    return faces
+            log.warn("GEO220", path, message, hint="triangulate the mesh", span=place(int(large[0])))
+        kept = np.flatnonzero(counts >= 3)
+        if not kept.size:
+            log.fail("GEO210", path, f"{path} has no triangle", hint="expected at least one triangle")
+        try:
+            faces, crossing = triangulate(
+                vertices, corners[np.repeat(counts >= 3, counts)], counts[kept], Work(limits.polygon_work)
+            )
+        except TooMuchWorkError as stopped:
+            worst = int(kept[stopped.part])
+            message = (
+                f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have "
+                f"to be looked at; this polygon has {counts[worst]} corners and is not convex"
+            )
+            hint = f"triangulate the mesh, or {Limits.hint('polygon_work')}"
+            log.fail("GEO270", path, message, hint=hint, span=place(worst))
+        if crossing:
+            message = f"{len(crossing)} polygons cross themselves; what they enclose is a guess"
+            log.warn("GEO222", path, message, span=place(int(kept[crossing[0]])))
+        return faces
 
 
 def _short(word: str) -> str:

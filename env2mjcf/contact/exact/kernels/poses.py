@@ -138,7 +138,7 @@ def _turn(frame: Any, i: int, j: int, angle: float) -> None:
 
 @compiled
 def _place_base(step: Any, q: Any, frame: Any) -> None:
-    """Translate and turn by Rz Ry Rx (env-format section 9.2)."""
+    """Translate and turn by Rz Ry Rx."""
     for k in range(3):
         frame[4 * k + 3] = q[step[2 + k]] if step[2 + k] >= 0 else 0.0
     sx, cx = _sine_and_cosine(q, step[5])

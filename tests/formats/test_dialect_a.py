@@ -1,4 +1,4 @@
-"""Dialect A, the planner of 1998 to 2012 (env-format section 4): every angle in degrees, `to_body` before `to_dh`."""
+"""Dialect A, the planner of 1998 to 2012: every angle in degrees, `to_body` before `to_dh`."""
 
 from __future__ import annotations
 
@@ -282,7 +282,7 @@ def test_a_wrong_count_is_a_warning_and_the_file_is_believed(
         ("0 1 Actuated", "1 1 Actuated", "ENV116", "a connection from body 1 to itself", "parent"),
         ("Revolute", "Helical", "ENV121", "unknown joint type 'Helical'; expected 'Revolute' or 'Prismatic'", "write"),
         ("FixedBody", "Wall", "ENV122", "unknown body tag 'Wall'; expected 'FreeBody' or 'FixedBody'", "write"),
-        ("MultiBody Passive", "MultiBody Obstacle", "ENV120", "unknown tag 'Obstacle'; expected 'Active'", "write"),
+        ("MultiBody Passive", "MultiBody Obstacle", "ENV120", "unknown multibody tag 'Obstacle'; expected", "write"),
         ("90 0.3 0.4 30", "90 nan 0.4 30", "ENV113", "expected a number (a), found 'nan'", "finite"),
         ("90 0.3 0.4 30", "-inf 0.3 0.4 30", "ENV113", "expected a number (alpha), found '-inf'", "finite"),
         ("90 0.3 0.4 30", "90 0x1F 0.4 30", "ENV112", "expected a number (a), found '0x1F'", "decimal number"),
