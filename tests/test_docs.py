@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 from extras import skip_without
 from snippets import RUN, SHOWN, blocks, commands
 
@@ -161,3 +162,39 @@ def test_modules_of_unusual_size_have_a_reason() -> None:
 def test_the_citation_names_this_version() -> None:
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.search(rf"^version: {re.escape(env2mjcf.__version__)}$", citation, re.MULTILINE)
+
+
+def shown(page: str, begins: str) -> str:
+    """Return the block of a page on the formats that begins with some words."""
+    found = [b.body for b in blocks((DOCS / "format" / page).read_text(encoding="utf-8")) if b.body.startswith(begins)]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_scenes_written_by_the_pages_on_formats_read_alike(tmp_path: Path) -> None:
+    texts = {
+        "a.env": shown("env.md", "2\nMultiBody Active"),
+        "d.env": shown("env.md", "Boundary Box ["),
+        "scene.env": shown("xml.md", "<Environment"),
+        "arm.robot": shown("xml.md", "<Robot>"),
+        "problem.xml": shown("xml.md", "<MotionPlanning>"),
+    }
+    for file, text in texts.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    scenes = [env2mjcf.read(tmp_path / file) for file in ("a.env", "d.env", "problem.xml")]
+    assert [str(s.dialect) for s in scenes] == ["A", "D", "E"]
+    for scene in scenes:
+        (robot,), (wall,) = scene.robots, scene.obstacles
+        assert [b.filename for b in robot.bodies] == ["base.g", "arm.g"]
+        assert robot.connections[0].dh.a == robot.connections[0].to_body.position[0] == 0.5
+        assert wall.bodies[0].pose is not None
+        assert wall.bodies[0].pose.position == (3, 0, 0)
+        assert {d.code for d in scene.diagnostics} <= {"ENV309"}  # what the problem says about pairs
+    assert [len(c) for t in scenes[2].tasks for c in t.configurations] == [7, 7]
+
+
+def test_the_mesh_on_the_page_on_meshes_is_a_tetrahedron(tmp_path: Path) -> None:
+    (tmp_path / "corner.g").write_text(shown("meshes.md", "1 4 4 12"), encoding="utf-8")
+    mesh = trimesh.load_mesh(tmp_path / "corner.g")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(1 / 6)
