@@ -36,3 +36,13 @@ def corpus() -> Path:
     if not CORPUS.is_dir():
         pytest.fail(f"ENV2MJCF_CORPUS names {CORPUS}, which is no folder")
     return CORPUS
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as slow every case of a `slow_but(*words)` test whose id holds none of the words."""
+    for item in items:
+        case = getattr(item, "callspec", None)
+        for mark in item.iter_markers("slow_but"):
+            if case and not any(word in case.id for word in mark.args):
+                item.add_marker(pytest.mark.slow)

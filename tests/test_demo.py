@@ -72,6 +72,7 @@ def test_the_demo_reports_what_plain_mujoco_finds(tmp_path: Path) -> None:
         assert in_report == (pair in bodies), pair
 
 
+@pytest.mark.slow
 @needs_gl
 @needs("view")
 def test_the_demo_draws_robot_and_obstacles(tmp_path: Path) -> None:

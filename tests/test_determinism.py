@@ -59,6 +59,7 @@ def shorten(mesh: Path) -> None:
     mesh.write_text(text.replace("0.2", "0.1"))
 
 
+@pytest.mark.slow_but("two-robots")
 @pytest.mark.parametrize("name", SCENES)
 def test_the_bytes_do_not_depend_on_hash_seed_threads_or_current_directory(name: str, tmp_path: Path) -> None:
     scene = MODELS / name / f"{name}.env"

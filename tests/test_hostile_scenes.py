@@ -156,6 +156,7 @@ class TestCounts:
         assert found.span is not None
         assert text.splitlines()[found.span.line - 1].startswith("495 496 Revolute")
 
+    @pytest.mark.slow
     def test_the_longest_chain_loads(self, folder: Path) -> None:
         assert load(folder, BOX + "1\n" + chain(496), self_collision=False).model.nbody == 497
 

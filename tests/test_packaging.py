@@ -7,6 +7,7 @@ import re
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
+from importlib.util import resolve_name
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,13 @@ PYPROJECT = ROOT / "pyproject.toml"
 
 
 @pytest.fixture(scope="module")
-def project() -> dict[str, Any]:
-    return tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["project"]
+def pyproject() -> dict[str, Any]:
+    return tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def project(pyproject: dict[str, Any]) -> dict[str, Any]:
+    return pyproject["project"]
 
 
 def bounds(requirements: list[str]) -> dict[str, str]:
@@ -35,7 +41,9 @@ def release(version: str) -> tuple[int, ...]:
 def runtime(project: dict[str, Any]) -> list[str]:
     """Return what is required by the package and by its extras for users."""
     extras = project["optional-dependencies"]
-    return project["dependencies"] + [r for name in extras if name not in ("dev", "notebooks") for r in extras[name]]
+    return project["dependencies"] + [
+        r for name in extras if name not in ("notebooks", "test", "bench", "docs", "lint", "dev") for r in extras[name]
+    ]
 
 
 def test_the_oldest_versions_are_those_that_are_tested(project: dict[str, Any]) -> None:
@@ -52,13 +60,27 @@ def test_everything_has_an_oldest_version(project: dict[str, Any]) -> None:
 
 def test_nothing_is_imported_that_is_not_required(project: dict[str, Any]) -> None:
     required = set(bounds(runtime(project)))
-    # Dask's extra `distributed` is the package of that name.
-    required.add("distributed")
+    # Dask's extra `distributed` is the package of that name; the plugin of pytest is imported by pytest alone.
+    required |= {"distributed", "pytest"}
     owners = packages_distributions()
     for path in sorted((ROOT / "env2mjcf").rglob("*.py")):
         for name in imported(ast.parse(path.read_text(encoding="utf-8"))):
             if name not in sys.stdlib_module_names and name in owners and name != "env2mjcf":
                 assert {o.lower() for o in owners[name]} & required, f"{path} imports {name}"
+
+
+def test_modules_that_are_named_in_strings_lie_in_the_same_room_or_below(pyproject: dict[str, Any]) -> None:
+    """`make lint` sees import statements alone."""
+    (layers,) = (c["layers"] for c in pyproject["tool"]["importlinter"]["contracts"] if c["type"] == "layers")
+    floors = {room: floor for floor, rooms in enumerate(layers) for room in rooms.split(" | ")}
+    for path in sorted((ROOT / "env2mjcf").glob("*/**/*.py")):
+        package = ".".join(path.relative_to(ROOT).parts[:-1])
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(call, ast.Call) and "import_module" in ast.dump(call.func):
+                name = ast.literal_eval(call.args[0]) if isinstance(call.args[0], ast.Constant) else ""
+                if name.startswith("."):
+                    room, above = resolve_name(name, package).split(".")[1], package.split(".")[1]
+                    assert room == above or floors[room] > floors[above], f"{path} imports {name}"
 
 
 def imported(tree: ast.AST) -> set[str]:

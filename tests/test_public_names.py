@@ -361,7 +361,7 @@ def plugin(folder: Path) -> dict[str, list[str]]:
         asked = [[*words, "--fixtures", "-q"], [*words, "--help"]]
         fixtures, helped = pool.map(lambda w: run(w, stdout=subprocess.PIPE, cwd=folder).stdout, asked)
     return {
-        "fixtures": re.findall(r"^(\w+).* -- .*_env2mjcf_pytest\.py", fixtures, re.MULTILINE),
+        "fixtures": re.findall(r"^(\w+).* -- .*(?:_env2mjcf_pytest|pytest_plugin)\.py", fixtures, re.MULTILINE),
         "options": sorted(set(re.findall(r"--env2mjcf-[a-z-]+", helped))),
     }
 

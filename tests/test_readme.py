@@ -40,6 +40,7 @@ def test_the_table_of_models_is_up_to_date() -> None:
     assert finished.returncode == 0, f"{finished.stdout}\n{finished.stderr}\nto make it anew: make tables"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("corpus")
 def test_the_table_of_the_corpus_is_up_to_date() -> None:
     finished = checked("corpus")

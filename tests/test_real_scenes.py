@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from mjcf_schema import assert_known_to_mujoco
-from real_scenes import deviation, matrices, real_scene, scene_names
+from real_scenes import FEW, deviation, matrices, real_scene, scene_names
 
 import env2mjcf
 
@@ -21,6 +21,7 @@ def load(name: str, **options: object) -> env2mjcf.Scene:
     return env2mjcf.load(real.env, **{**real.keywords, **options})
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names())
 def test_a_complete_scene_converts_and_loads_in_plain_mujoco(corpus: Path, tmp_path: Path, name: str) -> None:
     real = real_scene(name)
@@ -33,6 +34,7 @@ def test_a_complete_scene_converts_and_loads_in_plain_mujoco(corpus: Path, tmp_p
     assert_known_to_mujoco(result.xml.read_text())
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 @pytest.mark.parametrize("collision", ["surface", "auto"])
 def test_links_stand_where_the_golden_vectors_put_them(corpus: Path, name: str, collision: str) -> None:
@@ -59,6 +61,7 @@ def test_the_page_reading_agrees_where_the_golden_vectors_have_it(corpus: Path, 
         assert deviation(poses, matrices(row["poses"])) < 1e-9
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 def test_verdicts_agree_outside_the_band(corpus: Path, name: str) -> None:
     golden = real_scene(name).read_golden()
@@ -72,6 +75,7 @@ def test_verdicts_agree_outside_the_band(corpus: Path, name: str) -> None:
         assert solid.in_collision(q) == row["hit_solid"]
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 def test_queries_decode_to_the_recorded_poses(corpus: Path, name: str) -> None:
     real, golden = real_scene(name), real_scene(name).read_golden()
@@ -104,6 +108,7 @@ def test_missing_meshes_are_one_error_that_names_them_all(corpus: Path, name: st
             assert Path(word).name in str(caught.value)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names())
 def test_a_scene_simulates_stably(corpus: Path, name: str) -> None:
     real = real_scene(name)
@@ -156,6 +161,7 @@ def test_what_the_planner_recorded_as_free_is_free(
         assert not scene.in_collision(q).any(), file
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 def test_recorded_queries_are_free_at_both_ends(corpus: Path, name: str) -> None:
     if not real_scene(name).read_golden().get("query"):

@@ -89,6 +89,7 @@ class Leaks:
         self.kept.append(None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("leak", "words"),
     [("scene", "memory grew"), ("descriptor", "descriptors grew"), ("thread", "threads grew"), ("file", "files grew")],
@@ -106,6 +107,7 @@ def test_a_real_leak_is_found(soak: Soak, tmp_path: Path, leak: str, words: str)
     assert any(words in finding for finding in soak.findings)
 
 
+@pytest.mark.slow
 def test_an_answer_that_changes_is_found(soak: Soak, known: list[Known]) -> None:
     kept = known[0].answers["poses", "exact"]
     known[0].answers["poses", "exact"] = kept + 1e-15

@@ -209,7 +209,10 @@ class TestPlugin:
         assert importlib.util.find_spec("env2mjcf.testing.pytest_plugin")
 
     def test_imports_nothing_but_pytest(self):
-        code = "import sys, env2mjcf.testing.pytest_plugin; sys.exit(' '.join({'lxml', 'numpy', 'mujoco'} & set(sys.modules)) or 0)"
+        code = (
+            "import sys, env2mjcf.testing.pytest_plugin\n"
+            "sys.exit(' '.join({'lxml', 'numpy', 'mujoco'} & set(sys.modules)) or 0)"
+        )
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         done = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False

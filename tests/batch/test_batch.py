@@ -200,9 +200,9 @@ def test_a_killed_run_is_resumed_and_every_verdict_right(scene, tmp_path) -> Non
 def test_ctrl_c_keeps_what_is_done(scene, tmp_path) -> None:
     saved(scene, 200_000)
     program = (
-        "import signal, sys; from env2mjcf.batch import running; from env2mjcf.cli.main import main\n"
+        "import signal, sys; from env2mjcf.batch import runner; from env2mjcf.cli.main import main\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "running._FIRST = 200; running._GROWTH = 1\n"
+        "runner._FIRST = 200; runner._GROWTH = 1\n"
         "sys.exit(main(['batch', 'scene.env', 'q.npy', '-o', 'v.npy', '--engine', 'mujoco', '--what', 'clearance']))\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

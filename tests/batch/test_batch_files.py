@@ -254,6 +254,7 @@ def test_the_longest_name_will_do(scene) -> None:
     assert len(np.load(name)) == 10
 
 
+@pytest.mark.slow_but("250")
 @pytest.mark.parametrize("end", [folders.kill_at, folders.fail_at])
 @pytest.mark.parametrize("row", [None, 0, 250])
 def test_at_whatever_moment_it_ends_the_next_run_is_right(scene, tmp_path, monkeypatch, end, row) -> None:

@@ -519,6 +519,7 @@ class TestProgram:
         assert program("check", "d.env", "1.5", "0", "0", cwd=folder).returncode == 1
         assert program("check", "d.env", "0", "0", "0", cwd=folder).returncode == 0
 
+    @pytest.mark.slow
     def test_is_silent_when_nobody_listens(self, folder):
         np.save(folder / "q.npy", np.tile([1.5, 0, 0], (20_000, 1)))
         command = [sys.executable, "-m", "env2mjcf", "check", "d.env", "q.npy", "--json"]

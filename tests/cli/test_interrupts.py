@@ -20,6 +20,7 @@ from env2mjcf.view import offscreen
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 
 
+@pytest.mark.slow_but("convert")
 @pytest.mark.parametrize(
     "verb",
     [
@@ -55,6 +56,7 @@ time.sleep(60)
 """
 
 
+@pytest.mark.slow_but("code0")
 @pytest.mark.parametrize(
     ("module", "code"),
     [
@@ -92,6 +94,7 @@ def wait_for(what: Callable[[], object], child: subprocess.Popen[bytes]) -> None
         time.sleep(0.01)
 
 
+@pytest.mark.slow_but("15")
 @needs("view")
 @pytest.mark.skipif(offscreen.backend() is None, reason="no GL")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
@@ -117,6 +120,7 @@ def test_other_signals_end_it_as_tidily(number: signal.Signals, tmp_path: Path) 
     assert list((tmp_path / "made").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_nohup_ignores_stays_ignored(tmp_path: Path) -> None:
     interrupting.prepare(tmp_path)
     (tmp_path / "first").mkdir()

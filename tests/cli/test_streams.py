@@ -55,6 +55,7 @@ def scenes(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow_but("check nothing")
 @pytest.mark.parametrize("words", CASES)
 def test_without_stderr_a_verb_works_and_keeps_its_status(words: str, scenes: Path) -> None:
     for before in (full(2), closed(2)):
@@ -63,6 +64,7 @@ def test_without_stderr_a_verb_works_and_keeps_its_status(words: str, scenes: Pa
         assert bool(out) == (CASES[words] in (DONE, FINDING))
 
 
+@pytest.mark.slow_but("info")
 @pytest.mark.parametrize("words", CASES)
 def test_with_stdout_closed_a_verb_works_and_keeps_its_status(words: str, scenes: Path) -> None:
     assert run(words, scenes, closed(1))[:2] == (CASES[words], "")
@@ -75,6 +77,7 @@ def test_what_is_written_does_not_go_into_the_place_of_a_closed_stream(scenes: P
     assert {p.name: p.read_bytes() for p in (scenes / "closed").rglob("*.*")} == whole
 
 
+@pytest.mark.slow_but("info", "version")
 @pytest.mark.parametrize("words", ["check colliding.env", "info scene.env --json", "--version", "check --help"])
 def test_results_that_cannot_be_written_are_one_sentence(words: str, scenes: Path) -> None:
     status, _, said = run(words, scenes, full(1))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from distances import surface_distances
-from real_scenes import real_scene, scene_names
+from real_scenes import FEW, real_scene, scene_names
 from scenes import MODELS, box_mesh, free_cube, notched_block, write_scene
 
 import env2mjcf
@@ -110,6 +110,7 @@ def test_with_hulls_the_hulls_are_measured(tmp_path: Path) -> None:
     assert auto.clearance(above) == pytest.approx(np.hypot(0.3, 0.4), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_push_as_long_as_the_depth_separates_and_a_much_shorter_one_does_not(tmp_path: Path) -> None:
     """The depth bounds the shortest translation that separates; 300 directions come near to that one."""
     path = write_scene(tmp_path, free_cube("block.g 0 0 0 0 0 0", robot=FLYER),
@@ -132,6 +133,7 @@ def test_a_push_as_long_as_the_depth_separates_and_a_much_shorter_one_does_not(t
     assert parted_by_less <= 3
 
 
+@pytest.mark.slow_but("alpha", "seed", "maze")
 @pytest.mark.parametrize("name", ["seed", "alpha", "bug-trap", "maze", "two-robots", "gantry", "spherical-arm"])
 def test_models_are_as_far_apart_as_coal_says(name: str) -> None:
     scene = env2mjcf.load(MODELS / f"{name}/{name}.env", **robots_of(name))
@@ -152,6 +154,7 @@ def robots_of(name: str) -> dict[str, object]:
     return {"robots": [robot]} if robot.exists() else {}
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 def test_golden_margins_are_met(corpus: Path, name: str) -> None:
     real = real_scene(name)
@@ -169,6 +172,7 @@ def test_golden_margins_are_met(corpus: Path, name: str) -> None:
                 assert clearance <= 0
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names())
 def test_real_scenes_are_as_far_apart_as_coal_says(corpus: Path, name: str) -> None:
     real = real_scene(name)

@@ -68,6 +68,7 @@ def test_every_query_has_the_answers_of_one_thread(client: Any, scene: env2mjcf.
     )
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_verdict(client: Any, scene: env2mjcf.Scene) -> None:
     before = pids(client)
     assert len(before) == 2
@@ -123,6 +124,7 @@ def test_ctrl_c_takes_tasks_back(client: Any, scene: env2mjcf.Scene, monkeypatch
     assert not any(client.processing().values())
 
 
+@pytest.mark.slow
 def test_nobody_at_the_address_is_wrong_usage(
     scene: env2mjcf.Scene, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

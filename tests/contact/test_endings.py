@@ -14,7 +14,8 @@ from scenes import free_cube, write_scene
 ENDLESS = """
 import sys, threading, time
 import numpy as np
-from env2mjcf.contact.batch import Question, ask
+from env2mjcf.contact.tasks import Question
+from env2mjcf.contact.threads import ask
 
 def slow(queries, rows):
     began.set()
@@ -30,7 +31,7 @@ began.wait()
 COMPILED = """
 import sys, threading
 import env2mjcf
-from env2mjcf.contact.chunks import Chunks
+from env2mjcf.contact.tasks import Chunks
 
 began, took = threading.Event(), Chunks.took
 def tell(*words):
@@ -53,6 +54,7 @@ scene = env2mjcf.load(sys.argv[2], engine="mujoco")
 """
 
 
+@pytest.mark.slow_but("compiled-1", "exit-2")
 @pytest.mark.parametrize("threads", ["1", "2"])
 @pytest.mark.parametrize("code", [ENDLESS, COMPILED, AT_EXIT], ids=["endless", "compiled", "at exit"])
 def test_the_interpreter_ends_while_a_daemon_thread_asks(code: str, threads: str, tmp_path: Path) -> None:

@@ -54,6 +54,7 @@ def near(scene: env2mjcf.Scene, n: int, seed: int = 0) -> np.ndarray:
     return q
 
 
+@pytest.mark.slow_but("spawn")
 def test_verdicts_are_those_of_this_thread(cubes: env2mjcf.Scene, executor: Executor) -> None:
     q = near(cubes, 5000)
     touching = cubes.in_collision(q, threads=1)
@@ -80,6 +81,7 @@ def test_clearances_edges_and_contacts_are_the_same_numbers(cubes: env2mjcf.Scen
         np.testing.assert_array_equal(getattr(there, name), getattr(here, name))
 
 
+@pytest.mark.slow_but("3")
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_the_number_of_threads_changes_nothing(cubes: env2mjcf.Scene, threads: int) -> None:
     q, to = near(cubes, 100), near(cubes, 100, seed=1)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_scenes import real_scene, scene_names
+from real_scenes import FEW, real_scene, scene_names
 from scenes import MODELS, box_mesh, free_cube, notched_block, write_scene
 
 import env2mjcf
@@ -115,6 +115,7 @@ def assert_sane(scene: env2mjcf.Scene, rows: np.ndarray) -> int:
     return count
 
 
+@pytest.mark.slow_but("hull")
 @pytest.mark.parametrize("name", ["seed", "alpha", "bug-trap", "two-robots", "gantry"])
 @pytest.mark.parametrize("collision", ["auto", "surface", "hull"])
 def test_contacts_of_models_are_sane(name: str, collision: str) -> None:
@@ -124,6 +125,7 @@ def test_contacts_of_models_are_sane(name: str, collision: str) -> None:
     assert assert_sane(scene, np.concatenate([rows[:5], touching])) or not len(touching)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names(golden=True))
 def test_contacts_of_real_scenes_are_sane(corpus: Path, name: str) -> None:
     real = real_scene(name)

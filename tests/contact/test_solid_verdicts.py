@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_scenes import real_scene
+from real_scenes import FEW, real_scene
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from truth import Truth, bisected, near_obstacles
 
@@ -29,12 +29,14 @@ def assert_right(scene: env2mjcf.Scene, rows: int = ROWS) -> None:
     assert 0.2 < verdicts.mean() < 0.8 or rows < ROWS
 
 
+@pytest.mark.slow_but("alpha")
 @pytest.mark.parametrize("collision", ["solid", "auto"])
 @pytest.mark.parametrize("name", ["alpha/alpha.env", "bug-trap/bug-trap.env", "maze/maze.xml", "seed/seed.env"])
 def test_models(name: str, collision: str) -> None:
     assert_right(env2mjcf.load(MODELS / name, collision=collision))
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize(
     "name",
     [

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from extras import skip_without
-from real_scenes import scene_names
+from real_scenes import FEW, scene_names
 
 import env2mjcf
 
@@ -34,6 +34,7 @@ def case(corpus: Path, name: str) -> Case:
     return next(c for c in corpus_cases(corpus) if c.name == name)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("engine", ["mujoco", "exact"])
 @pytest.mark.parametrize("name", scene_names())
 def test_no_verdict_is_wrong_outside_the_band(corpus: Path, name: str, engine: str) -> None:
@@ -49,6 +50,7 @@ def test_no_verdict_is_wrong_outside_the_band(corpus: Path, name: str, engine: s
     assert name in STILL | FOR_EVER or result.bisected >= COUNT // 2
 
 
+@pytest.mark.slow
 def test_the_comparison_finds_hulls_wrong(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     load = env2mjcf.load
     monkeypatch.setattr(env2mjcf, "load", lambda path, **options: load(path, **{**options, "collision": "hull"}))

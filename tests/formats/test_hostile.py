@@ -150,6 +150,7 @@ class TestTime:
             times.append(time.process_time() - start)
         return min(times)
 
+    @pytest.mark.slow_but("elements")
     @pytest.mark.parametrize("name", TEXTS)
     def test_of_an_environment(self, read: Reader, name: str) -> None:
         assert self.grows(read.env, *self.TEXTS[name]) < 10

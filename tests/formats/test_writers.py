@@ -172,6 +172,7 @@ def test_any_environment_with_all_that_its_dialect_has_is_kept(
     assert_kept(scene, tmp_path_factory.mktemp("scene"))
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(scene=rich_environments(), random=st.randoms(use_true_random=False))
 def test_blanks_comments_and_the_spelling_of_numbers_change_nothing(

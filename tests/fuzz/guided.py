@@ -1,6 +1,6 @@
 """Fuzz a reader guided by coverage, with atheris.
 
-    python fuzz/guided.py byu corpus-of-byu/ -max_total_time=1800
+    python tests/fuzz/guided.py byu corpus-of-byu/ -max_total_time=1800
 
 What follows the reader goes to libFuzzer: folders of inputs, the first of which grows, and its flags.
 """

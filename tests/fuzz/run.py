@@ -1,6 +1,6 @@
 """Fuzz a reader by mutation, each input under limits of time and memory.
 
-    python fuzz/run.py byu --seconds 1800 --seeds models /data/scenes
+    python tests/fuzz/run.py byu --seconds 1800 --seeds models /data/scenes
 
 Findings are written to the folder of `--out`; the exit status is 1 where there is one.
 """

@@ -176,6 +176,7 @@ def test_the_result_does_not_depend_on_the_run() -> None:
     assert loops[0] == loops[1]
 
 
+@pytest.mark.slow
 def test_corpus_surfaces_are_kept(corpus: Path) -> None:
     for mesh in corpus_meshes(corpus):
         vertices, faces, polygons = merged(mesh)

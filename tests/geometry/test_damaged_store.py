@@ -165,6 +165,7 @@ if __name__ != "__main__":
 """
 
 
+@pytest.mark.slow_but("code")
 @pytest.mark.parametrize("damage", ["index", "code"])
 def test_what_numba_keeps_is_compiled_anew_where_it_is_cut_short(damage: str, tmp_path: Path) -> None:
     """Of a small function, because the engine's own take a minute."""

@@ -48,6 +48,7 @@ class TestParts:
         boxes = sorted((*p.min(axis=0).round(6).tolist(), *p.max(axis=0).round(6).tolist()) for p in parts)
         assert boxes == [(0, 0, 0, 4, 3, 1), (0, 0, 1, 4, 1, 3), (0, 2, 1, 4, 3, 3)]
 
+    @pytest.mark.slow
     def test_are_the_same_every_time_and_sorted(self, monkeypatch):
         mesh = channel()
         first = approximate_parts(mesh.vertices, mesh.faces)

@@ -188,6 +188,7 @@ def test_the_bytes_are_the_same_on_every_run() -> None:
     assert not np.signbit(one.quat[one.quat == 0]).any()
 
 
+@pytest.mark.slow
 def test_corpus_bodies_agree_with_trimesh_and_compile(corpus: Path) -> None:
     solids = 0
     for mesh in corpus_meshes(corpus):

@@ -134,6 +134,7 @@ def test_a_repair_is_an_error_in_strict_mode() -> None:
         repair_diagnostics(mesh, repaired(mesh), DiagnosticLog(strict=True))
 
 
+@pytest.mark.slow
 def test_corpus_surfaces_never_move(corpus: Path) -> None:
     for mesh in corpus_meshes(corpus):
         if len(mesh.faces) <= 200:

@@ -316,6 +316,7 @@ def test_a_body_in_the_groove_is_free_of_prisms_but_not_of_the_hull() -> None:
     assert data.ncon > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SIZES)
 @pytest.mark.parametrize("strategy", ["auto", "hull", "surface"])
 def test_mujoco_takes_every_corpus_mesh(corpus: Path, strategy: str, scene: float) -> None:

@@ -187,6 +187,7 @@ class TestCache:
         remember(GeometryCache(folder), Builder(), "a")
         assert (left.exists(), fresh.exists()) == (False, True)
 
+    @pytest.mark.slow
     def test_many_processes_may_write_one_entry(self, folder):
         context = multiprocessing.get_context("spawn")
         with context.Pool(3) as pool:

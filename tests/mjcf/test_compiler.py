@@ -16,6 +16,7 @@ import env2mjcf
 from env2mjcf.kinematics.forward import RobotKinematics
 
 
+@pytest.mark.slow_but("seed", "auto")
 @pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
 @pytest.mark.parametrize("collision", ["hull", "surface", "auto"])
 def test_every_model_is_mjcf_that_mujoco_knows(path: Path, collision: str) -> None:

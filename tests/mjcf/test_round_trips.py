@@ -17,7 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from real_scenes import real_scene, scene_names
+from real_scenes import FEW, real_scene, scene_names
 from scenes import MODELS, SCENES, box_mesh, free_cube, write_scene
 
 import env2mjcf
@@ -266,11 +266,13 @@ def original(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return written(scene, tmp_path_factory.mktemp("scene"), 200)
 
 
+@pytest.mark.slow_but("seed", "closed-chain", "two-robots")
 @pytest.mark.parametrize("way", TEXT)
 def test_text_of_mujocos_own_is_the_same_scene_but_for_the_digits_it_leaves_out(original: Original, way: Way) -> None:
     original.compare(way(original.path), LOST, LOST_WAY)
 
 
+@pytest.mark.slow_but("seed", "closed-chain", "two-robots")
 @pytest.mark.parametrize("way", TEXT)
 def test_text_with_all_digits_is_the_same_scene(original: Original, way: Way) -> None:
     with all_digits():
@@ -325,6 +327,7 @@ def test_two_of_one_scene_stand_side_by_side() -> None:
     np.testing.assert_allclose(two.poses[:, 1], one.poses[:, 1], atol=1e-12)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", scene_names())
 def test_a_real_scene_survives_mujocos_writer(corpus: Path, tmp_path: Path, name: str) -> None:
     real = real_scene(name)

@@ -176,6 +176,7 @@ def test_a_stem_is_fit_for_every_system(name: str, stem: str) -> None:
 # Terminals.
 
 
+@pytest.mark.slow_but("script", "newline", "escape", "bidi", "surrogate", "long")
 def test_no_name_reaches_a_terminal_as_it_is(
     mesh: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -240,9 +241,9 @@ def test_what_libraries_say_is_no_command_either() -> None:
 
 
 def test_a_name_on_the_page_is_text(stem: str) -> None:
-    shown = wording.text(stem)
+    shown = wording.as_text(stem)
     assert not set("<>\"'") & set(shown)
-    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), wording.label(mesh_stem(f"{stem}.g")))
+    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), wording.as_label(mesh_stem(f"{stem}.g")))
 
 
 # Texts.

@@ -194,6 +194,7 @@ def test_many_motions_are_judged_as_each_of_them_is(maze: env2mjcf.Scene):
     assert together.motions == alone.motions == 200
 
 
+@pytest.mark.slow
 def test_the_bug_gets_out_of_its_bottle():
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
     start, goal = scene.queries[0].q
@@ -456,6 +457,7 @@ def test_wrong_words_are_told_before_anything_is_planned(room: Path, capsys: pyt
     assert "CFG542" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
     code = "import sys, env2mjcf.cli.plan, env2mjcf.cli.check; from env2mjcf import planning; planning.plan; "
     code += "sys.exit('ompl' in sys.modules)"
@@ -465,6 +467,7 @@ def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["RRTConnect", "PRM"])
 def test_the_collector_may_run_at_any_time(planner: str, room: Path):
     """Freed memory is filled, so that whoever looks at it crashes."""

@@ -45,6 +45,7 @@ def maze_place() -> str:
     return " ".join(read_model("maze/maze.env").strip().splitlines()[-1].split()[-6:-4])
 
 
+@pytest.mark.slow_but("0.0")
 @pytest.mark.parametrize(("speed", "seconds"), [(0.0, 10), (2.0, 16), (5.0, 12)])
 def test_a_ball_dropped_into_the_maze_stays_in_its_corridor(tmp_path: Path, speed: float, seconds: float) -> None:
     """Thrown, it rolls before it rests: nothing but tipping from facet to facet brakes it."""
@@ -94,6 +95,7 @@ def arm_scene(folder: Path, x: float, turn: float) -> env2mjcf.Scene:
     )
 
 
+@pytest.mark.slow_but("1.5")
 @pytest.mark.parametrize(("x", "turn"), [(1.05, 0.0), (1.5, 11.0)])
 def test_an_arm_falls_on_a_table_and_rests_on_it(tmp_path: Path, x: float, turn: float) -> None:
     """It lies on the top with two links, or leans over the edge with one."""

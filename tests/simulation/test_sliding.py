@@ -94,6 +94,7 @@ def sliding(folder: Path, slider: trimesh.Trimesh, turn: float, speed: float, st
     return data.qvel.copy()
 
 
+@pytest.mark.slow_but("0.8")
 @pytest.mark.parametrize("turn", [-2.7, 0.8, 2.2])
 @pytest.mark.parametrize("name", SLIDERS)
 def test_a_body_keeps_its_speed_and_course_over_the_seams_of_a_flat_face(

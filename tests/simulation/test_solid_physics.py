@@ -95,6 +95,7 @@ def test_a_hull_throws_the_box_out_of_the_bottle(tmp_path: Path) -> None:
     assert np.linalg.norm(scene.q()[:3]) > 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_box_dropped_into_the_real_bug_trap_comes_to_rest_in_it(corpus: Path, tmp_path: Path, seed: int) -> None:
     trap = next(real_scene("bug_trap1.0.bug-trap").env.parent.rglob("trap.obj"))
@@ -110,6 +111,7 @@ def test_a_box_dropped_into_the_real_bug_trap_comes_to_rest_in_it(corpus: Path, 
     assert scene.q()[2] < -8
 
 
+@pytest.mark.slow
 def test_a_non_convex_bug_comes_to_rest_in_the_bottle() -> None:
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")
     start(scene, scene.queries[0].q[0])
@@ -118,6 +120,7 @@ def test_a_non_convex_bug_comes_to_rest_in_the_bottle() -> None:
     assert -1.49 < scene.q()[2] < -1.1
 
 
+@pytest.mark.slow
 def test_alpha_tubes_hang_in_one_another() -> None:
     scene = env2mjcf.load(MODELS / "alpha/alpha.env", query=MODELS / "alpha/alpha.query")
     energy = start(scene, scene.queries[0].q[0])
@@ -131,6 +134,7 @@ def test_alpha_tubes_hang_in_one_another() -> None:
     assert np.abs(scene.data.qvel).max() < 2
 
 
+@pytest.mark.slow
 def test_alpha_tubes_hang_still_once_their_swing_is_taken_from_them() -> None:
     """They roll on each other like a pendulum, and would swing for minutes."""
     scene = env2mjcf.load(MODELS / "alpha/alpha.env", query=MODELS / "alpha/alpha.query")

@@ -1,6 +1,6 @@
 """Damages entries of the geometry cache at random, again and again, and looks whether the scenes stay what they are.
 
-    python stress/damage.py --count 2000
+    python tests/stress/damage.py --count 2000
 
 Each time the entries of one scene of `models/` are cut short, or some of their bits, blocks or bytes at the end are
 changed, or they are exchanged; then the scene is loaded twice. Prints one line of figures; exit status 1 if a scene was

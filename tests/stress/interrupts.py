@@ -1,6 +1,6 @@
 """Interrupts every verb at random moments, as Ctrl-C does, and looks at what it says and leaves.
 
-    python stress/interrupts.py --count 20
+    python tests/stress/interrupts.py --count 20
 
 Each has to end with status 130 (or to have been done before), without a traceback, half-written files or processes that
 go on. Prints one line of figures for each verb; exit status 1 if something is not as it should be.

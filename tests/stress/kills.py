@@ -1,6 +1,6 @@
 """Kills `env2mjcf convert` at random moments of its life, again and again, and looks at what it leaves.
 
-    python stress/kills.py --kills 200
+    python tests/stress/kills.py --kills 200
 
 Two scenes are converted to one name in one folder, which also holds files of somebody else. After every kill the folder
 has to hold the old scene or the new one, whole. Prints one line of figures; exit status 1 if something is not as it

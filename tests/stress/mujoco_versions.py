@@ -1,7 +1,7 @@
 """Loads the MJCF of the scenes in `models/` into plain MuJoCo, of every 4.x that the package index has.
 
-    python stress/mujoco_versions.py
-    python stress/mujoco_versions.py 4.0.0 3.17.0
+    python tests/stress/mujoco_versions.py
+    python tests/stress/mujoco_versions.py 4.0.0 3.17.0
 
 Each version gets an environment with nothing but MuJoCo and numpy, which says of every scene what it is made of, where
 everything is at given configurations, and what touches. That is compared with what the MuJoCo beside env2mjcf says.

@@ -1,6 +1,6 @@
 """Lets two to eight processes convert into one folder at once, while another reads it with plain MuJoCo.
 
-    python stress/races.py --rounds 50
+    python tests/stress/races.py --rounds 50
 
 Prints one line of figures for each way to get in each other's way; exit status 1 if something is not as it should be.
 """

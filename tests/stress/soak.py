@@ -1,6 +1,6 @@
 """Does everything at random in one process for a long time; answers stay what they were, and nothing grows.
 
-    python stress/soak.py --seconds 900
+    python tests/stress/soak.py --seconds 900
 
 Scenes are those of `models/`, and real ones where ENV2MJCF_CORPUS names their folder. Prints one line of figures; exit
 status 1 if an answer changed, anything unexpected was raised, or descriptors, threads, children, temporary files or

@@ -14,6 +14,19 @@ import numpy as np
 
 _FOLDER = os.environ.get("ENV2MJCF_CORPUS")
 
+# Scenes of each dialect, with one robot and several, with trees and loops; tests of all the others are slow.
+FEW = (
+    "LTunnel.tunnel",
+    "SerialWalls.serial",
+    "old-2loop.2loop_13con",
+    "old-testBranchs.branchs",
+    "pmpl-MultipleRobot.narrow",
+    "pmpl-ReachableVolumes.ClosedChain.chain.tree",
+    "exps-2DHeterogeneous.heterogeneous",
+    "ppl-3D.3d+linked",
+    "factory_simulation.map",
+)
+
 
 @dataclass(frozen=True)
 class RealScene:

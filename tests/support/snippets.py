@@ -1,4 +1,4 @@
-"""Runs the examples of a page of the documentation, as a reader would: `python tests/support/snippets.py PAGE`, in a copy.
+"""Runs the examples of a page of the documentation, as a reader would, in a copy: `tests/support/snippets.py PAGE`.
 
 From top to bottom, in the current folder:
 

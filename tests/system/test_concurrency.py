@@ -124,6 +124,7 @@ def elsewhere(held: Any) -> Iterator[None]:
 
 
 class TestThreads:
+    @pytest.mark.slow_but("alpha")
     @pytest.mark.parametrize(
         ("path", "engine"), [(ALPHA, "exact"), (CAR, "exact"), (ARM, "mujoco")], ids=["alpha", "cars", "arm"]
     )
@@ -142,6 +143,7 @@ class TestThreads:
         with ThreadPoolExecutor(12) as pool:
             assert [wrong for found in pool.map(work, range(12)) for wrong in found] == []
 
+    @pytest.mark.slow
     def test_that_read_convert_and_load_get_the_same(self, tmp_path: Path) -> None:
         def files(folder: Path) -> dict[str, bytes]:
             return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
@@ -242,6 +244,7 @@ class TestThreads:
 
 
 class TestProcesses:
+    @pytest.mark.slow_but("spawn")
     @pytest.mark.parametrize("method", ["spawn", "forkserver", "fork"])
     def test_of_every_kind_answer_alike(self, method: str) -> None:
         scenes = [env2mjcf.load(ALPHA), env2mjcf.load(ARM, engine="mujoco")]
@@ -321,6 +324,7 @@ class TestForks:
         threading.Timer(0.5, end).start()
         assert said_in_child(lambda: free() and ended.is_set(), 20) == "True"
 
+    @pytest.mark.slow
     def test_a_child_that_is_forked_while_a_scene_warms_up_can_use_it(self) -> None:
         """In a process of its own, in which nothing has imported numba yet."""
         skip_without("fast")

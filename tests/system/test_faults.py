@@ -54,6 +54,7 @@ def counted(work: Callable[[], object], counter: Callable[[], Callable[[], int]]
 class TestKilled:
     """SIGKILL leaves no chance to tidy up."""
 
+    @pytest.mark.slow_but("before")
     @pytest.mark.parametrize("at", ["before each call that changes the folder", "around each call of the code"])
     def test_a_conversion_killed_at_any_moment_leaves_the_old_scene_or_the_new_one(
         self, at: str, scenes: tuple[Path, Path], references: list[Content], out: Path, tmp_path: Path
@@ -61,7 +62,7 @@ class TestKilled:
         def killer(number: int) -> Callable[[], int]:
             if at.startswith("before"):
                 return folders.kill_at(number, out)
-            return folders.kill_in(number, ("scene_folder.py", "writing.py", "locking.py"))
+            return folders.kill_in(number, ("mjcf/folder.py", "system/files.py", "system/locks.py"))
 
         env2mjcf.convert(scenes[0], out)
         clean = folders.files(out)
@@ -127,6 +128,7 @@ class TestKilled:
         env2mjcf.convert(scenes[0], out)
         assert {n for n in mine if (out / n).read_text() == "mine"} == set(mine)
 
+    @pytest.mark.slow
     def test_the_whole_program_killed_at_random_moments(
         self, scenes: tuple[Path, Path], references: list[Content], out: Path
     ) -> None:
@@ -172,6 +174,7 @@ class TestFailing:
 
 
 class TestRaces:
+    @pytest.mark.slow
     def test_another_process_may_convert_at_any_moment(
         self, scenes: tuple[Path, Path], references: list[Content], out: Path, tmp_path: Path
     ) -> None:

@@ -45,7 +45,7 @@ CHANGING = {
     "env2mjcf.geometry.mesh._READERS": "readers of meshes by file ending; filled on import",
     "env2mjcf.planning.planner_space._remembered": "a cache of at most 512 read-only arrays, of 512 numbers at most",
     "env2mjcf.view.offscreen._backend": "a cache: the GL backend, by what MUJOCO_GL asks for",
-    "env2mjcf.testing._numbered": "numbers of pictures, by the name of the test that failed",
+    "env2mjcf.testing.assertions._numbered": "numbers of pictures, by the name of the test that failed",
 }
 
 
@@ -113,7 +113,7 @@ def test_modules_hold_no_state_but_what_is_listed_here(tmp_path: Path) -> None:
 
 def test_no_function_assigns_to_variables_of_its_module() -> None:
     # What ends the program belongs to the process, and concerns no library.
-    sources = [p.read_text() for p in (ROOT / "env2mjcf").rglob("*.py") if p.name != "starting.py"]
+    sources = [p.read_text() for p in (ROOT / "env2mjcf").rglob("*.py") if p.name != "program.py"]
     assert len(sources) > 100
     assert [line for text in sources for line in text.splitlines() if line.lstrip().startswith("global ")] == []
 
@@ -270,6 +270,7 @@ print(env2mjcf.write_path(scene, q, Path(sys.argv[2]) / "a.path").read_text())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("localedef"), reason="localedef, which makes locales, is not installed")
 def test_commas_of_a_locale_are_not_read_or_written(tmp_path: Path) -> None:
     """A process that has set a German locale, for MuJoCo's own reading of numbers, too."""

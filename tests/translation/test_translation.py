@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from real_scenes import RealScene, real_scene, real_scenes, scene_names
+from real_scenes import FEW, RealScene, real_scene, real_scenes, scene_names
 from scenes import MODELS
 from strategies import environments
 from texts import ENV_TEXTS, LEGACY, LEGACY_FIXED, NON_HOLONOMIC, PROBLEM, ROBOT, B, C, D, E, Reader, write
@@ -215,6 +215,7 @@ def test_verdicts_on_the_models_stay(name: str, tmp_path: Path) -> None:
     assert_same_verdicts(path, options, tmp_path)
 
 
+@pytest.mark.slow_but(*FEW)
 @pytest.mark.parametrize("name", [n for n in REAL if n in scene_names()] or ["corpus"])
 def test_verdicts_on_real_scenes_stay(corpus: Path, name: str, tmp_path: Path) -> None:
     real = real_scene(name)

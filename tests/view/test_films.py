@@ -178,6 +178,7 @@ def test_a_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: int) -> None:
     assert total - 1000 == pytest.approx(90 / fps * 1000, abs=10)
 
 
+@pytest.mark.slow
 @needs_gl
 @needs_view
 @pytest.mark.parametrize(
@@ -234,6 +235,7 @@ def test_render_draws_a_query_a_trail_and_contacts(cubes: env2mjcf.Scene, tmp_pa
     assert shown.stdout == "a.png: 160 x 120 pixels\n    cube touches cube_2\n"
 
 
+@pytest.mark.slow_but("words1")
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -251,6 +253,7 @@ def test_render_refuses_what_it_cannot_do(words: tuple[str, ...], message: str, 
     assert message in shown.stderr
 
 
+@pytest.mark.slow_but("words0")
 @needs_view
 @pytest.mark.parametrize("words", [("render",), ("play", "a.path"), ("check", "a.path")])
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
@@ -266,6 +269,7 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(
     assert "lies in none, which is no folder" in shown.stderr
 
 
+@pytest.mark.slow
 def test_a_gl_library_that_is_none_is_wrong_usage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_scene(tmp_path, free_cube())
     monkeypatch.setenv("MUJOCO_GL", "bogus")

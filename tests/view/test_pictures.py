@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cameras import projected
-from real_scenes import real_scene, scene_names
+from real_scenes import FEW, real_scene, scene_names
 from scenes import MODELS, SCENES, free_cube, write_scene
 
 import env2mjcf
@@ -67,6 +67,7 @@ def test_every_scene_of_ours_is_in_view(name: str) -> None:
     everything_is_in_view(scene, scene.queries[0].q[0] if scene.queries else None)
 
 
+@pytest.mark.slow_but(*FEW)
 @needs_gl
 @pytest.mark.usefixtures("corpus")
 @pytest.mark.parametrize("name", scene_names())
@@ -101,6 +102,7 @@ def test_the_robot_stands_where_its_pose_is_projected(cubes: env2mjcf.Scene) -> 
     np.testing.assert_allclose(found.max(axis=0) + 1, expected.max(axis=0), atol=1.1)
 
 
+@pytest.mark.slow
 @needs_gl
 def test_a_ghost_adds_to_the_picture_and_a_trail_does_too(cubes: env2mjcf.Scene) -> None:
     home, aside = cubes.space.home, np.array([-9.0, 0, 0, 0, 0, 0])
@@ -137,6 +139,7 @@ def test_what_touches_is_red(cubes: env2mjcf.Scene) -> None:
     assert red(picture(cubes, size=(320, 240), contacts=True)) == 0, "nothing touches at home"
 
 
+@pytest.mark.slow
 @needs_gl
 def test_a_robot_in_a_bottle_is_seen_through_it() -> None:
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env", query=MODELS / "bug-trap/bug-trap.query")

@@ -40,6 +40,7 @@ def rows(scene: env2mjcf.Scene, count: int, seed: int) -> np.ndarray:
 
 @needs_numba
 class TestVerdicts:
+    @pytest.mark.slow_but("alpha", "bug-trap")
     def test_are_those_of_the_triangles(self, model: env2mjcf.Scene) -> None:
         truth = Truth(model)
         q = np.concatenate([rows(model, 100, 1), bisected(model, truth, 30, 40, seed=2)])
@@ -71,6 +72,7 @@ class TestVerdicts:
         # Rows that do not lie one after the other in memory.
         np.testing.assert_array_equal(model.in_collision(np.asfortranarray(q)[::7]), together[::7])
 
+    @pytest.mark.slow_but("alpha", "bug-trap")
     def test_go_with_contacts(self, model: env2mjcf.Scene) -> None:
         for row in bisected(model, Truth(model), 20, 45, seed=6):
             assert bool(model.contacts(row)) == model.in_collision(row)
@@ -142,6 +144,7 @@ class TestClearance:
             )
             assert found == pytest.approx(expected, abs=1e-6 * model.extent)
 
+    @pytest.mark.slow_but("bug-trap")
     def test_is_positive_just_where_nothing_touches(self, model: env2mjcf.Scene) -> None:
         q = rows(model, 300, 8)
         hits = model.in_collision(q)
@@ -149,6 +152,7 @@ class TestClearance:
         # Depths are searched for in numpy, which takes its time.
         assert (model.clearance(q[hits][:6]) <= 0).all()
 
+    @pytest.mark.slow_but("gantry", "maze", "spherical")
     def test_of_a_row_does_not_depend_on_the_others(self, model: env2mjcf.Scene) -> None:
         q = rows(model, 40, 17)
         q = q[np.argsort(~model.in_collision(q), kind="stable")][:6]

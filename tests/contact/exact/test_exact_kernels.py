@@ -55,6 +55,7 @@ def meets(p: list[int], q: list[int], t: list[list[int]]) -> bool:
     return all(side >= 0 for side in sides)
 
 
+@pytest.mark.slow
 def test_triangles_meet_as_rational_numbers_say() -> None:
     rng = np.random.default_rng(1)
     met = 0
@@ -171,6 +172,7 @@ def test_trees_over_equal_boxes_are_not_deep() -> None:
     assert depth(child) <= 6
 
 
+@pytest.mark.slow
 def test_steps_place_links_where_the_kinematics_do() -> None:
     from env2mjcf.contact.exact.kernels.poses import place
 
@@ -202,6 +204,7 @@ def test_steps_place_links_where_the_kinematics_do() -> None:
     assert checked > 200
 
 
+@pytest.mark.slow
 def test_rays_count_as_winding_numbers_do() -> None:
     """Of the bottle, from points all over it, and from points whose rays go through corners of the mesh."""
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env")

@@ -60,6 +60,7 @@ def vtk_polygons(path: Path) -> tuple[np.ndarray, list[list[int]]]:
     return points, polygons
 
 
+@pytest.mark.slow
 def test_every_mesh_of_the_corpus_is_what_vtk_reads(corpus: Path) -> None:
     files = sorted(corpus.rglob("*.g"))
     assert len(files) > 100

@@ -64,11 +64,13 @@ def test_a_surface_that_crosses_or_touches_itself_has_no_cell_outside(mesh: Mesh
     assert_compiles(shape)
 
 
+@pytest.mark.slow_but("bug.g", "bent")
 @pytest.mark.parametrize("name", MODEL_MESHES)
 def test_cells_of_model_meshes_stay_inside_and_cover_the_surface(name: str) -> None:
     assert_inside_and_covering(loaded(MODELS / name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CORPUS_MESHES)
 def test_cells_of_real_meshes_stay_inside_and_cover_the_surface(corpus: Path, name: str) -> None:
     mesh = next(m for m in corpus_meshes(corpus) if m.path.name == name)
@@ -225,6 +227,7 @@ def test_every_piece_compiles_in_mujoco(name: str) -> None:
     assert_compiles(lined(MESHES[name])[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CORPUS_MESHES)
 def test_every_piece_of_real_meshes_compiles_in_mujoco(corpus: Path, name: str) -> None:
     assert_compiles(lined(next(m for m in corpus_meshes(corpus) if m.path.name == name))[0])

@@ -62,6 +62,7 @@ def test_a_pipe_that_a_problem_names_is_refused(name: str, tmp_path: Path) -> No
     assert f"{name}" in said.splitlines()[1]  # the line of the problem that names it
 
 
+@pytest.mark.slow_but("b.env")
 @pytest.mark.parametrize("name", ["b.env", "b.robot", "b.xml", "b.g"])
 def test_lint_waits_for_no_pipe(name: str, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
@@ -80,6 +81,7 @@ def test_a_file_of_configurations_is_no_pipe(tmp_path: Path) -> None:
     assert (status, "no regular file" in said) == (3, True)
 
 
+@pytest.mark.slow
 def test_pipes_in_the_folder_that_is_written_to_are_not_waited_for(tmp_path: Path) -> None:
     scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
     out = tmp_path / "out"
@@ -97,6 +99,7 @@ def test_pipes_in_the_folder_that_is_written_to_are_not_waited_for(tmp_path: Pat
     assert "v.npy.journal is no regular file" in said
 
 
+@pytest.mark.slow
 def test_the_user_may_name_a_pipe(tmp_path: Path) -> None:
     scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
     expected = run("check", scene)
