@@ -44,6 +44,7 @@ tables: $(VENV)/demo.stamp  ## make the tables of README.md, benchmarks/ and doc
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python docs/diagnostics.py
 	$(BIN)/python docs/figures/connection.py
+	$(BIN)/python docs/figures/architecture.py
 
 pictures: $(VENV)/demo.stamp  ## draw the pictures in docs/ anew
 	$(BIN)/python models/demo.py --gallery docs/models.png

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from importlib.metadata import version as installed_version
 from pathlib import Path, PurePosixPath
 from posixpath import normpath
 
 from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
 
 HERE = Path(__file__).resolve().parent
 # The checkout's code is what is described, whatever is installed.
@@ -54,6 +56,8 @@ html_theme_options = {"top_of_page_buttons": []}
 PAGES = {
     "README.md": "/index.md",
     "CHANGELOG.md": "/changelog.md",
+    "CONTRIBUTING.md": "/contributing.md",
+    "SECURITY.md": "/security.md",
     "benchmarks/RESULTS.md": "/benchmarks/results.md",
     "benchmarks/corpus.md": "/benchmarks/corpus.md",
     "benchmarks/speed.md": "/benchmarks/speed.md",
@@ -91,20 +95,48 @@ def on_include(app: Sphinx, relative_path: Path, parent_docname: str, content: l
     content[0] = with_site_links(content[0], PurePosixPath(path.as_posix()).parent)
 
 
+# What the docstrings of properties say, before napoleon takes all up to a colon for a type.
+WORDS: dict[str, list[str]] = {}
+
+
 def on_docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Keep napoleon from taking what stands before a colon for the type of a property."""
+    """Keep what properties say from napoleon."""
     if what in ("attribute", "property"):
-        lines.insert(0, "")
+        WORDS[name] = list(lines)
 
 
 def on_fields(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Keep docutils from taking the name of a type that ends in an underscore for a link."""
+    """Keep docutils from taking for links, or for bold, what is neither.
+
+    Names of types that end in an underscore, endings of files such as `.xml`, and keyword arguments (`**options`).
+    """
+    lines[:] = WORDS.pop(name, lines)
     lines[:] = [re.sub(r"\bnp\.bool_(?=\W|$)", "bool", line) if ":vartype" in line else line for line in lines]
+    lines[:] = [re.sub(r"(?<!`)`(\.\w+)`(?!`)", r"``\1``", line) for line in lines]
+    lines[:] = [re.sub(r"(?<!\S)\*\*(?=\w+ )(?!.*\*\*)", r"\\*\\*", line) for line in lines]
+
+
+def on_signature(
+    app: Sphinx, what: str, name: str, obj: object, options: object, signature: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """Let an alias in a union be its name."""
+    alias = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+    return signature and alias.sub(r"\1", signature), returns and alias.sub(r"\1", returns)
+
+
+def without_overloads(
+    analyzer: ModuleAnalyzer, analyze: Callable[[ModuleAnalyzer], None] = ModuleAnalyzer.analyze
+) -> None:
+    """Let a method have one signature, that of its code: overloads are for type checkers."""
+    analyze(analyzer)
+    analyzer.overloads.clear()
 
 
 def setup(app: Sphinx) -> None:
     """Connect these."""
+    ModuleAnalyzer.analyze = without_overloads
     app.connect("source-read", on_source)
     app.connect("include-read", on_include)
+    app.connect("autodoc-process-signature", on_signature)
     app.connect("autodoc-process-docstring", on_docstring, priority=400)
     app.connect("autodoc-process-docstring", on_fields, priority=600)

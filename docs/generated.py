@@ -84,9 +84,8 @@ def _code(value: object) -> str:
 
 
 def _help(*verb: str) -> str:
-    environment = {
-        **os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": str(WIDTH), "NO_COLOR": "1", "TERM": "dumb"
-    }  # fmt: skip
+    plain = {"PYTHONPATH": str(ROOT), "COLUMNS": str(WIDTH), "NO_COLOR": "1", "TERM": "dumb"}
+    environment = {**os.environ, **plain}
     done = subprocess.run(
         [sys.executable, "-m", "env2mjcf", *verb, "--help"], env=environment, capture_output=True, text=True, check=True
     )

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 from extras import skip_without
 from snippets import RUN, SHOWN, blocks, commands
 
@@ -98,6 +99,11 @@ def test_the_picture_of_a_connection_is_what_its_script_draws() -> None:
     assert done.returncode == 0, "run `make tables`"
 
 
+def test_the_picture_of_the_rooms_shows_their_imports() -> None:
+    done = subprocess.run([sys.executable, DOCS / "figures" / "architecture.py", "--check"], check=False)
+    assert done.returncode == 0, "run `make tables`"
+
+
 def test_the_page_of_diagnostics_lists_every_code() -> None:
     done = subprocess.run([sys.executable, DOCS / "diagnostics.py", "--check"], check=False)
     assert done.returncode == 0, "run `make tables`"
@@ -129,3 +135,67 @@ def test_an_example_that_differs_is_found(page: str, complaint: str, tmp_path: P
     with pytest.raises(pytest.fail.Exception) as failure:
         follow(tmp_path / "page.md", tmp_path)
     assert complaint in str(failure.value)
+
+
+ARCHITECTURE = DOCS / "architecture.md"
+PACKAGE = ROOT / "env2mjcf"
+
+
+def test_the_page_on_architecture_names_what_is_there() -> None:
+    text = ARCHITECTURE.read_text(encoding="utf-8")
+    paths = {p for p in re.findall(r"`([\w/]+\.pyi?)`", text) if "/" in p and not p.startswith(("tests/", "models/"))}
+    gone = sorted(p for p in paths if not (PACKAGE / p.removeprefix("env2mjcf/")).is_file())
+    assert gone == []
+    for row in re.findall(r"^\| [^|]+ \| (`[^|]+`) \| (`[^|]+`) \| .+ \|$", text, re.MULTILINE):
+        code = "".join((PACKAGE / p).read_text(encoding="utf-8") for p in re.findall(r"`([\w/.]+)`", row[0]))
+        for name in re.findall(r"`(\w+)`", row[1]):
+            assert re.search(rf"^(?:def|class) {name}\b", code, re.MULTILINE), f"{row[0]} has no {name}"
+
+
+def test_modules_of_unusual_size_have_a_reason() -> None:
+    table = ARCHITECTURE.read_text(encoding="utf-8").split("\n## Sizes\n")[1]
+    explained = {p for row in re.findall(r"^\| (`.+?`) \|", table, re.MULTILINE) for p in re.findall(r"`(.+?)`", row)}
+    modules = [p for p in PACKAGE.rglob("*.py") if p.name != "__init__.py"]
+    sizes = {p.relative_to(PACKAGE).as_posix(): len(p.read_text(encoding="utf-8").splitlines()) for p in modules}
+    assert {p for p, lines in sizes.items() if not 80 <= lines <= 350} == explained
+
+
+def test_the_citation_names_this_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.search(rf"^version: {re.escape(env2mjcf.__version__)}$", citation, re.MULTILINE)
+
+
+def shown(page: str, begins: str) -> str:
+    """Return the block of a page on the formats that begins with some words."""
+    found = [b.body for b in blocks((DOCS / "format" / page).read_text(encoding="utf-8")) if b.body.startswith(begins)]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_scenes_written_by_the_pages_on_formats_read_alike(tmp_path: Path) -> None:
+    texts = {
+        "a.env": shown("env.md", "2\nMultiBody Active"),
+        "d.env": shown("env.md", "Boundary Box ["),
+        "scene.env": shown("xml.md", "<Environment"),
+        "arm.robot": shown("xml.md", "<Robot>"),
+        "problem.xml": shown("xml.md", "<MotionPlanning>"),
+    }
+    for file, text in texts.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    scenes = [env2mjcf.read(tmp_path / file) for file in ("a.env", "d.env", "problem.xml")]
+    assert [str(s.dialect) for s in scenes] == ["A", "D", "E"]
+    for scene in scenes:
+        (robot,), (wall,) = scene.robots, scene.obstacles
+        assert [b.filename for b in robot.bodies] == ["base.g", "arm.g"]
+        assert robot.connections[0].dh.a == robot.connections[0].to_body.position[0] == 0.5
+        assert wall.bodies[0].pose is not None
+        assert wall.bodies[0].pose.position == (3, 0, 0)
+        assert {d.code for d in scene.diagnostics} <= {"ENV309"}  # what the problem says about pairs
+    assert [len(c) for t in scenes[2].tasks for c in t.configurations] == [7, 7]
+
+
+def test_the_mesh_on_the_page_on_meshes_is_a_tetrahedron(tmp_path: Path) -> None:
+    (tmp_path / "corner.g").write_text(shown("meshes.md", "1 4 4 12"), encoding="utf-8")
+    mesh = trimesh.load_mesh(tmp_path / "corner.g")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(1 / 6)
