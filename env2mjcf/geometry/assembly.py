@@ -25,7 +25,7 @@ from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 from .store import GeometryCache, default_folder
 
-# Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles (design: section 6).
+# Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles.
 _THICKNESS_PER_EXTENT = 5e-6
 
 # Extents in metres beyond which the unit of a file is doubtful.
@@ -83,7 +83,7 @@ class RobotParts:
 
     @property
     def radius(self) -> float:
-        """The planner's bounding radius r_0 + 2 sum r_i (env-format section 10.4)."""
+        """The planner's bounding radius: that of the first body, and twice those of the others."""
         radii = [p.radius for p in self.links]
         return radii[0] + 2 * sum(radii[1:])
 
@@ -109,7 +109,7 @@ class Assembly:
 
     @property
     def extent(self) -> float:
-        """Diagonal of the bounding box: the unit of every tolerance (design: section 2)."""
+        """Diagonal of the bounding box: the unit of every tolerance."""
         return float(np.linalg.norm(self.upper - self.lower))
 
     @property
@@ -117,9 +117,14 @@ class Assembly:
         """Clearance or depth, in metres, beyond which verdicts are certain: both bodies of a pair may be off."""
         return 2 * max((p.certificate.band for p in self.parts() if p.certificate is not None), default=0.0)
 
+    @property
+    def links(self) -> tuple[Part, ...]:
+        """The bodies of all robots, in file order."""
+        return tuple(p for r in self.robots for p in r.links)
+
     def parts(self) -> tuple[Part, ...]:
         """Return all bodies: robots, obstacles, surfaces."""
-        return (*(p for r in self.robots for p in r.links), *self.obstacles, *self.surfaces)
+        return (*self.links, *self.obstacles, *self.surfaces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -272,9 +277,8 @@ def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array,
         return np.full(3, -0.5), np.full(3, 0.5)
     corners: list[Array] = []
     for b in bodies:
-        used = b.mesh.vertices[np.unique(b.mesh.faces)]
         with _overflow_is_seen_later():
-            world = used @ b.pose[:3, :3].T + b.pose[:3, 3]
+            world = b.mesh.used_vertices @ b.pose[:3, :3].T + b.pose[:3, 3]
         farthest = float(np.abs(world).max())
         # Not a number compares as false.
         if not farthest <= LARGEST:

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from .distance import distances, spread
-from .orientation import winding_numbers
+from .orientation import encloses
 from .pieces import hull_faces, hull_volume
 from .shapes import CollisionShape
 from .store import GeometryCache
-from .topology import Bools, Floats, Ints
+from .topology import Bools, Floats, Ints, area_vectors
 
 APPROXIMATE = ("hull", "coacd")
 """Strategies whose verdicts may be wrong by more than the tolerance of contact."""
@@ -142,8 +142,7 @@ def _pieces(shape: CollisionShape) -> _Pieces:
     faces = hull_faces([piece.vertices for piece in shape.pieces])
     planes: list[tuple[Floats, Floats]] = []
     for cloud, own in zip(clouds, faces, strict=True):
-        corners = cloud[own]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = area_vectors(cloud[own])
         length = np.linalg.norm(normals, axis=1)
         normals = normals[length > 0] / length[length > 0, None]
         # The farthest corner, so that float32 in the hull lets no point of the cloud out.
@@ -211,7 +210,7 @@ def _in_solid(points: Floats, shape: CollisionShape) -> Bools:
     analysis = shape.analysis
     if not analysis.solid:
         return np.zeros(len(points), dtype=np.bool_)
-    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5
+    return encloses(analysis.vertices, analysis.faces, points)
 
 
 def _reach(points: Floats, apart: Floats, inside: Callable[[Floats], Bools]) -> float:

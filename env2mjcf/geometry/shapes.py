@@ -20,7 +20,7 @@ from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
-from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
+from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, by_component, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 
@@ -225,9 +225,7 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     out = np.zeros(analysis.components, dtype=np.bool_)
     if not analysis.solid:
         return out
-    order = np.argsort(analysis.component, kind="stable")
-    groups = np.split(analysis.faces[order], np.cumsum(np.bincount(analysis.component))[:-1])
-    parts = [np.unique(g, return_inverse=True) for g in groups]
+    parts = [np.unique(g, return_inverse=True) for g in by_component(analysis.faces, analysis.component)]
     points = [analysis.vertices[used] for used, _ in parts]
     low, high = (np.array([f(p, axis=0) for p in points]) for f in (np.min, np.max))
     size = np.linalg.norm(high - low, axis=1)

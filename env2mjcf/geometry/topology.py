@@ -35,7 +35,7 @@ class Edges:
     balance: Ints
 
     def neighbours(self) -> tuple[Ints, Ints, Ints]:
-        """Return pairs of corners (2, p) that follow each other at an edge, the edge's two in order, and the edge."""
+        """Return the corners of faces that share an edge, one pair after the other, and that edge, (p,) each."""
         corner = np.argsort(self.of_corner.ravel(), kind="stable")
         edge = self.of_corner.ravel()[corner]
         pair = np.flatnonzero(edge[1:] == edge[:-1])

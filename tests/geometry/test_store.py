@@ -20,7 +20,7 @@ from env2mjcf.cli.main import main
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry import shapes
 from env2mjcf.geometry.analysis import analyse
-from env2mjcf.geometry.packing import pack, unpack
+from env2mjcf.geometry.serialization import pack, unpack
 from env2mjcf.geometry.store import GeometryCache, default_folder, entry_key
 
 BUG_TRAP = MODELS / "bug-trap" / "bug-trap.env"

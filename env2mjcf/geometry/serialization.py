@@ -1,4 +1,4 @@
-"""Nested frozen dataclasses as one JSON text and a few flat arrays, and back: no pickle, so no code in an entry."""
+"""Nested frozen dataclasses as one JSON text and a few flat arrays, and back: without pickle, so no code is in it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,22 @@ def unpack(arrays: Mapping[str, NDArray[Any]], kinds: Sequence[type], known: Map
     flat = {k: arrays[k] for k in _KINDS}
     for array in flat.values():
         array.setflags(write=False)
-    return _Unpacker(flat, kinds, known).decode(json.loads(arrays["skeleton"].tobytes()))
+
+    def decode(value: Any) -> Any:
+        if type(value) is list:
+            return tuple(decode(v) for v in value)
+        if type(value) is not dict:
+            return value
+        if "array" in value:
+            letter, start, shape = value["array"]
+            return flat[letter][start : start + prod(shape)].reshape(shape)
+        if "plain" in value:
+            return tuple(value["plain"])
+        if "known" in value:
+            return known[value["known"]]
+        return kinds[value["kind"]](*[decode(v) for v in value["fields"]])
+
+    return decode(json.loads(arrays["skeleton"].tobytes()))
 
 
 class _Packer:
@@ -79,22 +94,3 @@ class _Packer:
         self._used[letter] += array.size
         self.arrays[letter].append(array.reshape(-1))
         return [letter, start, list(array.shape)]
-
-
-class _Unpacker:
-    def __init__(self, flat: Mapping[str, NDArray[Any]], kinds: Sequence[type], known: Mapping[str, object]) -> None:
-        self._flat, self._kinds, self._known = flat, kinds, known
-
-    def decode(self, value: Any) -> Any:
-        if type(value) is list:
-            return tuple(self.decode(v) for v in value)
-        if type(value) is not dict:
-            return value
-        if "array" in value:
-            letter, start, shape = value["array"]
-            return self._flat[letter][start : start + prod(shape)].reshape(shape)
-        if "plain" in value:
-            return tuple(value["plain"])
-        if "known" in value:
-            return self._known[value["known"]]
-        return self._kinds[value["kind"]](*[self.decode(v) for v in value["fields"]])
