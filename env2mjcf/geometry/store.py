@@ -8,7 +8,6 @@ import platform
 import re
 import secrets
 import struct
-import sys
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +20,7 @@ from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from platformdirs import user_cache_path
 
 from ..diagnostics import DiagnosticLog
 from ..system.files import NoRegularFileError, open_regular
@@ -52,19 +52,10 @@ def default_folder() -> Path | None:
     named = os.environ.get(FOLDER_VARIABLE)
     if named:
         return Path(os.path.abspath(named))
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or ""
-        # The XDG specification has relative paths ignored.
-        base = base if os.path.isabs(base) else home / ".cache"
-    return Path(base) / "env2mjcf"
+    with suppress(RuntimeError):
+        folder = user_cache_path("env2mjcf", appauthor=False, opinion=False)
+        return folder if folder.is_absolute() else None
+    return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The exact engine: verdicts, distances and edges on triangles, by compiled code without Python's lock.
 
-MERGED: The compiled functions of the exact engine: imported late, compiled anew where the disk is damaged, safe at forks.
+The compiled functions are imported late, compiled anew where what is kept of them is damaged, and safe at forks.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...kinematics.transforms import Array
 from ...pairs import Pair
 from ..surfaces import Surfaces
 from .instructions import program
-from .tables import Table, packed
+from .tables import WIDTHS, Tables, packed
 
 Bools = NDArray[np.bool_]
 
@@ -121,8 +121,7 @@ def compile_all() -> float:
     What is compiled is the same for every scene: tables of any kind will do, such as empty ones.
     """
     start = time.perf_counter()
-    nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
-    kernels, tables = entries(), packed(nothing)
+    kernels, tables = entries(), packed(Tables(*(np.zeros(0) for _ in WIDTHS))._replace(counts=np.zeros(3)))
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
     call(kernels.collisions, *tables, rows, answers)
     call(kernels.validities, *tables, rows, answers)
@@ -136,7 +135,7 @@ class _Loading:
     """Held while the engine is imported; a process is not forked before that is done, nor while numba compiles.
 
     Numba's lock, and Python's own of modules that are being imported, would stay locked in the child. Unlike what
-    `forking.Lock` guards, what they guard cannot be begun anew.
+    `system.locks.Lock` guards, what they guard cannot be begun anew.
     """
 
     def __init__(self) -> None:

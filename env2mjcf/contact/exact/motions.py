@@ -112,7 +112,10 @@ class Motions:
 def _elements(
     robot: RobotKinematics, k: int, columns: dict[tuple[int | None, int, DofKind], int]
 ) -> Iterator[tuple[Motion, Floats | int]]:
-    """Yield the factors of a connection: constant transforms, and motions with their columns (env-format 9.3)."""
+    """Yield the factors of a connection, constant transforms and motions with their columns.
+
+    Their order is that of docs/format/kinematics.md.
+    """
     connection = robot.multibody.connections[k]
     dh, form = connection.dh, robot.multibody.dh_form
 

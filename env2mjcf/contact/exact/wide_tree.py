@@ -12,12 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.topology import Floats, Ints
-
-LANES = 8
-"""Boxes of a node."""
-
-BLOCK = 4
-"""Triangles of a leaf."""
+from .tables import BLOCK, LANES
 
 # Of an unused lane: no box is near it. Finite, because compiled code takes for granted that nothing is infinite.
 _NOWHERE = -1e150
