@@ -25,7 +25,7 @@ class BoundaryTest:
 
     def __init__(self, boundary: Boundary | None, links: Sequence[Part]) -> None:
         self._boundary = boundary
-        self._vertices = [p.mesh.vertices[np.unique(p.mesh.faces)] for p in links]
+        self._vertices = [p.mesh.used_vertices for p in links]
 
     def inside(self, poses: Array) -> NDArray[np.bool_]:
         """Return whether every vertex is inside, (n,), for link poses (n, nlinks, 4, 4)."""

@@ -124,14 +124,9 @@ def _boxes(triangles: Floats, start: Ints, size: Ints) -> tuple[Floats, Floats, 
         center, half = mean + (axes @ ((low + high) / 2)[..., None])[..., 0], (high - low) / 2
         if best is None:
             best = center, axes, half
-            continue
-        better = _surface(half) < _surface(best[2])
-        chosen = better[:, None]
-        best = (
-            np.where(chosen, center, best[0]),
-            np.where(chosen[..., None], axes, best[1]),
-            np.where(chosen, half, best[2]),
-        )
+        better = (_surface(half) < _surface(best[2]))[:, None]
+        center, half = np.where(better, center, best[0]), np.where(better, half, best[2])
+        best = center, np.where(better[..., None], axes, best[1]), half
     assert best is not None
     return best
 

@@ -86,7 +86,7 @@ class Judge:
         self._scene, self._q, self._labels = scene, q, labels
         self._placed = np.zeros(len(q), dtype=bool) if fits is None or poses is None else ~fits
         assembly = scene.compiled.assembly
-        links = [p for r in assembly.robots for p in r.links]
+        links = assembly.links
         self._boundaries = [(p.name, BoundaryTest(assembly.environment.boundary, [p])) for p in links]
         hulls = scene.report.collision == "hull"
         self._plates = {p.name for p in assembly.parts() if not hulls and not p.analysis.convex}
@@ -184,7 +184,7 @@ class LiveJudge:
         self._engine: Engine = "mujoco" if chosen == "auto" else chosen
         self._scene = scene
         boundary = scene.compiled.assembly.environment.boundary
-        links = [p for r in scene.compiled.assembly.robots for p in r.links]
+        links = scene.compiled.assembly.links
         self._boundaries = [(p.name, BoundaryTest(boundary, [p])) for p in links] if boundary else []
 
     def verdict(self, q: Array) -> Judgement:
