@@ -214,7 +214,7 @@ def _in_solid(points: Floats, shape: CollisionShape) -> Bools:
 
 
 def _reach(points: Floats, apart: Floats, inside: Callable[[Floats], Bools]) -> float:
-    """Return the greatest of the distances of points that are not inside; the farthest are asked first."""
+    """Return the greatest of the distances of points that are not inside; the farthest are tested first."""
     order = np.argsort(-apart, kind="stable")
     for i in range(0, len(order), _BATCH):
         some = order[i : i + _BATCH]

@@ -130,7 +130,7 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
             log.fail("GEO274", str(path), message, hint="save it as UTF-8")
         vertices, faces = _READERS[extension](data, str(path), log, limits)
     else:
-        log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
+        log.info("GEO208", str(path), f"{path} is read through trimesh: the original planner did not read this format")
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
     largest = float(np.abs(vertices).max())
     if largest > LARGEST:

@@ -29,10 +29,35 @@ def pack(value: object, kinds: Sequence[type], known: Mapping[str, object]) -> d
     Raises:
         TypeError: Something else occurs.
     """
-    packer = _Packer(kinds, known)
-    skeleton = json.dumps(packer.encode(value), separators=(",", ":")).encode()
-    arrays = {k: np.concatenate([np.zeros(0, d), *packer.arrays[k]]) for k, d in _KINDS.items()}
-    return {"skeleton": np.frombuffer(skeleton, dtype=np.uint8), **arrays}
+    numbers = {kind: i for i, kind in enumerate(kinds)}
+    names = {kind: [f.name for f in dataclasses.fields(kind)] for kind in kinds}
+    known_names = {id(thing): name for name, thing in known.items()}
+    used = dict.fromkeys(_KINDS, 0)
+    arrays: dict[str, list[NDArray[Any]]] = {k: [] for k in _KINDS}
+
+    def encode(value: Any) -> Any:
+        kind = type(value)
+        if id(value) in known_names:
+            return {"known": known_names[id(value)]}
+        if kind in _PLAIN:
+            return value
+        if kind is tuple:
+            return {"plain": value} if all(type(v) in _PLAIN for v in value) else [encode(v) for v in value]
+        if kind is np.ndarray:
+            letter = next((k for k, d in _KINDS.items() if value.dtype == d), None)
+            if letter is None:
+                raise TypeError(f"an array of {value.dtype} cannot be stored")
+            start = used[letter]
+            used[letter] += value.size
+            arrays[letter].append(value.reshape(-1))
+            return {"array": [letter, start, list(value.shape)]}
+        if kind in numbers:
+            return {"kind": numbers[kind], "fields": [encode(getattr(value, name)) for name in names[kind]]}
+        raise TypeError(f"a {kind.__name__} cannot be stored")
+
+    skeleton = json.dumps(encode(value), separators=(",", ":")).encode()
+    flat = {k: np.concatenate([np.zeros(0, d), *arrays[k]]) for k, d in _KINDS.items()}
+    return {"skeleton": np.frombuffer(skeleton, dtype=np.uint8), **flat}
 
 
 def unpack(arrays: Mapping[str, NDArray[Any]], kinds: Sequence[type], known: Mapping[str, object]) -> Any:
@@ -60,37 +85,3 @@ def unpack(arrays: Mapping[str, NDArray[Any]], kinds: Sequence[type], known: Map
         return kinds[value["kind"]](*[decode(v) for v in value["fields"]])
 
     return decode(json.loads(arrays["skeleton"].tobytes()))
-
-
-class _Packer:
-    def __init__(self, kinds: Sequence[type], known: Mapping[str, object]) -> None:
-        self._kinds = {kind: i for i, kind in enumerate(kinds)}
-        self._fields = {kind: [f.name for f in dataclasses.fields(kind)] for kind in kinds}
-        self._known = {id(thing): name for name, thing in known.items()}
-        self._used = dict.fromkeys(_KINDS, 0)
-        self.arrays: dict[str, list[NDArray[Any]]] = {k: [] for k in _KINDS}
-
-    def encode(self, value: Any) -> Any:
-        if id(value) in self._known:
-            return {"known": self._known[id(value)]}
-        kind = type(value)
-        if kind in _PLAIN:
-            return value
-        if kind is tuple:
-            if all(type(v) in _PLAIN for v in value):
-                return {"plain": value}
-            return [self.encode(v) for v in value]
-        if kind is np.ndarray:
-            return {"array": self._array(value)}
-        if kind in self._kinds:
-            return {"kind": self._kinds[kind], "fields": [self.encode(getattr(value, f)) for f in self._fields[kind]]}
-        raise TypeError(f"a {kind.__name__} cannot be stored")
-
-    def _array(self, array: NDArray[Any]) -> list[Any]:
-        letter = next((k for k, d in _KINDS.items() if array.dtype == d), None)
-        if letter is None:
-            raise TypeError(f"an array of {array.dtype} cannot be stored")
-        start = self._used[letter]
-        self._used[letter] += array.size
-        self.arrays[letter].append(array.reshape(-1))
-        return [letter, start, list(array.shape)]

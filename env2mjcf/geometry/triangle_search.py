@@ -136,7 +136,7 @@ class Search:
     def _promising(self, job: Ints, low: Floats) -> Ints:
         """Return the rows of the least bounds of each group."""
         order = np.argsort(low, kind="stable")
-        return order[_turn(self._jobs.group[job[order]]) < _PROBES]
+        return order[_rank(self._jobs.group[job[order]]) < _PROBES]
 
     def _exactly(self, job: Ints, a: Ints, b: Ints, low: Floats) -> None:
         """Take the distance of pairs of triangles, the most promising first, until the rest cannot matter."""
@@ -204,7 +204,7 @@ def _opened(trees: Forest, job: Ints, a: Ints, b: Ints) -> tuple[Ints, Ints, Int
     return job[of], start_a[of] + step_a, start_b[of] + step_b
 
 
-def _turn(values: Ints) -> Ints:
+def _rank(values: Ints) -> Ints:
     """Return for each value how many equal ones stand before it."""
     order = np.argsort(values, kind="stable")
     runs = values[order]

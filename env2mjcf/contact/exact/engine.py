@@ -123,9 +123,8 @@ def compile_all() -> float:
     start = time.perf_counter()
     kernels, tables = entries(), packed(Tables(*(np.zeros(0) for _ in WIDTHS))._replace(counts=np.zeros(3)))
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
-    call(kernels.collisions, *tables, rows, answers)
-    call(kernels.validities, *tables, rows, answers)
-    call(kernels.distances, *tables, rows, floats)
+    for kernel, out in ((kernels.collisions, answers), (kernels.validities, answers), (kernels.distances, floats)):
+        call(kernel, *tables, rows, out)
     call(kernels.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
     call(kernels.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start
@@ -139,18 +138,12 @@ class _Loading:
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
         self._compiling: Any = None
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
 
     def before_fork(self) -> None:
         """Wait until nothing is imported or compiled, and keep it so."""
-        self._lock.acquire()
+        self.lock.acquire()
         # Not imported by anybody: then nothing compiles.
         module = sys.modules.get("numba.core.compiler_lock")
         self._compiling = getattr(module, "global_compiler_lock", None)
@@ -161,7 +154,7 @@ class _Loading:
         """Go on, in the parent and in the child."""
         if self._compiling is not None:
             self._compiling.release()
-        self._lock.release()
+        self.lock.release()
 
 
 _loading = _Loading()
@@ -172,12 +165,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def entries() -> Any:
-    """Return the module of compiled functions; imported when asked for: numba is slow to import, and an extra.
+    """Return the module of compiled functions; imported when first used: numba is slow to import, and an extra.
 
     Raises:
         ValueError: numba finds no folder to keep them.
     """
-    with _loading:
+    with _loading.lock:
         try:
             return import_module(".kernels.entries", __package__)
         except RuntimeError as error:

@@ -89,13 +89,13 @@ def packed(tables: Tables) -> tuple[Ints, Floats]:
     Returns:
         The integers, which begin with where each table starts and how many rows it has; and the floats.
     """
-    flat = [np.asarray(t, dtype=np.int64 if i < INTEGERS else np.float64).ravel() for i, t in enumerate(tables)]
+    ints: list[Ints] = [np.asarray(t, dtype=np.int64).ravel() for t in tables[:INTEGERS]]
+    floats: list[Floats] = [np.asarray(t, dtype=np.float64).ravel() for t in tables[INTEGERS:]]
     starts: list[int] = []
-    for first, group in ((2 * len(WIDTHS), range(INTEGERS)), (0, range(INTEGERS, len(WIDTHS)))):
-        start = first
-        for i in group:
-            rows, rest = divmod(len(flat[i]), WIDTHS[i])
-            assert rest == 0, Tables._fields[i]
-            starts += [start, rows]
-            start += len(flat[i])
-    return np.concatenate([np.array(starts, dtype=np.int64), *flat[:INTEGERS]]), np.concatenate(flat[INTEGERS:])
+    start = 2 * len(WIDTHS)
+    for i, flat in enumerate((*ints, *floats)):
+        start = 0 if i == INTEGERS else start
+        assert len(flat) % WIDTHS[i] == 0, Tables._fields[i]
+        starts += [start, len(flat) // WIDTHS[i]]
+        start += len(flat)
+    return np.concatenate([np.array(starts, dtype=np.int64), *ints]), np.concatenate(floats)

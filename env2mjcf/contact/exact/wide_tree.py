@@ -77,10 +77,6 @@ class _Branch:
     high: Floats
     halves: tuple[int, int] | None = None
 
-    @property
-    def surface(self) -> float:
-        return float(_surface(self.high - self.low))
-
 
 class _Builder:
     """Halves boxes where the surfaces of the halves, weighed by their numbers, are least; then widens the tree.
@@ -159,7 +155,7 @@ class _Builder:
 
     def _weight(self, branch: int) -> tuple[float, int]:
         b = self._branches[branch]
-        return b.surface, b.stop - b.start
+        return float(_surface(b.high - b.low)), b.stop - b.start
 
     def _widen(self) -> None:
         """Give each node the branches that are left when the widest of its branches are opened, until it is full."""

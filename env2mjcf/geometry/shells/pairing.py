@@ -106,24 +106,24 @@ def doubtful_polygons(
 
     Such are the parts of a flat cap that is folded over itself: covered twice one way, and once the other. In a
     surface without folds and crossings all cells that are linked side to side are inside or outside together,
-    because no face passes through a cell: one of them is asked. Else every cell is asked.
+    because no face passes through a cell: one of them is looked at. Else every cell is.
 
     Args:
         analysis: The mesh.
         polygons: Of the surface.
         cells: The cells of each polygon; none where there was no room.
         sides: How faces are paired at their edges.
-        thickness: Depth at which polygons without a cell are asked.
+        thickness: Depth at which polygons without a cell are looked at.
         work: What may be done.
     """
     # A surface that passes through itself, or touches itself, leaves no room for some cell, or cuts it.
     suspect = sides.folded or any(len(own) != 1 for own in cells)
     patch = np.arange(len(polygons)) if suspect else _patches(polygons, sides.links)
     some = range(len(cells)) if suspect else np.unique(patch, return_index=True)[1].tolist()
-    asked = [(i, cell) for i in some for cell in cells[i]]
-    insides = np.reshape([cell.center for _, cell in asked], (-1, 3))
+    tested = [(i, cell) for i in some for cell in cells[i]]
+    insides = np.reshape([cell.center for _, cell in tested], (-1, 3))
     outside = ~encloses(analysis.vertices, analysis.faces, insides, work)
-    wrong = patch[[i for (i, _), out in zip(asked, outside.tolist(), strict=True) if out]]
+    wrong = patch[[i for (i, _), out in zip(tested, outside.tolist(), strict=True) if out]]
     doubtful = [i for i, own in enumerate(cells) if not own or patch[i] in wrong]
     middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)

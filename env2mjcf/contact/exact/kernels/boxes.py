@@ -39,13 +39,9 @@ def boxes_apart(m: Pose, a0: float, a1: float, a2: float, b0: float, b1: float, 
 
 @compiled
 def lanes_near(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1: float, a2: float) -> int:
-    """Return the lanes whose boxes overlap another box, as bits.
+    """Return the lanes of a node, (48,), whose boxes overlap a box with centre c and half sizes a, as bits.
 
-    Args:
-        row: (48,) the boxes of a node.
-        m: The pose of their frame in the other box's.
-        c0, c1, c2: The other box's centre.
-        a0, a1, a2: Its half sizes.
+    The pose m is that of the node's frame in the box's.
     """
     r00, r01, r02, t0, r10, r11, r12, t1, r20, r21, r22, t2 = m
     s00, s01, s02, s10, s11, s12, s20, s21, s22 = sizes(m)

@@ -127,15 +127,10 @@ def _beside(a: Triangle, b: Triangle) -> bool:
 
 @compiled
 def box_meets(row: Any, m: Pose, h0: float, h1: float, h2: float) -> bool:
-    """Return whether a box about the origin, with half sizes h, meets any triangle of a leaf, (36,).
+    """Return whether a box about the origin, with half sizes h, meets any triangle of a leaf, (36,), at pose m.
 
     The box is solid: a triangle inside of it meets it. Axes: its sides, the triangle's normal, and the cross products
     of both (Akenine-Moeller, Fast 3D Triangle-Box Overlap Testing, 2001).
-
-    Args:
-        row: The leaf.
-        m: The pose of its frame in the box's.
-        h0, h1, h2: Half sizes.
     """
     r00, r01, r02, t0, r10, r11, r12, t1, r20, r21, r22, t2 = m
     meeting = 0
