@@ -189,11 +189,8 @@ def mesh_diagnostics(
     if analysis.flat:
         warn("GEO230", "all points lie in one plane: the mesh is a sheet without inside", "it collides as a thin plate")
     elif not analysis.closed:
-        warn(
-            "GEO232",
-            f"the surface is open: {analysis.open_edges} edges border an odd number of triangles",
-            "it collides as a sheet: a body wholly inside it does not count as touching",
-        )
+        message = f"the surface is open: {analysis.open_edges} edges border an odd number of triangles"
+        warn("GEO232", message, "it collides as a sheet: a body wholly inside it does not count as touching")
     # A sheet has no outside, so that its winding says nothing.
     if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
@@ -215,10 +212,6 @@ def refuse_without_area(analysis: Analysis, log: DiagnosticLog, subject: str, sp
         GeometryError: Always.
     """
     what = ("a point", "a line")[min(analysis.dimension, 1)]
-    log.fail(
-        "GEO231",
-        subject,
-        f"the mesh has no area: its faces collapse to {what}" if analysis.diagonal else "the mesh has no area",
-        hint="a body needs a surface to collide; give it triangles, or leave the body out",
-        span=span,
-    )
+    message = "the mesh has no area" + (f": its faces collapse to {what}" if analysis.diagonal else "")
+    hint = "a body needs a surface to collide; give it triangles, or leave the body out"
+    log.fail("GEO231", subject, message, hint=hint, span=span)

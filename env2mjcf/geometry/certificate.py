@@ -109,16 +109,13 @@ def certify(shape: CollisionShape, thickness: float) -> Certificate:
         thickness: That it was made with.
     """
     analysis = shape.analysis
-    if shape.strategy not in APPROXIMATE or analysis.convex or _exact_parts(shape):
+    # As `auto` makes them: each component is convex and has a hull of its own.
+    parts = shape.strategy == "hull" and len(shape.pieces) == analysis.components > 1
+    if shape.strategy not in APPROXIMATE or analysis.convex or parts:
         surface = shape.strategy == "surface" and not shape.needs_containment
         lost = analysis.volume if surface and analysis.solid else 0.0
         return Certificate(True, 0.0, lost, thickness, thickness, thickness, 0, 0.0, 0.0, 1.0 if lost else 0.0)
     return _measured(shape, thickness)
-
-
-def _exact_parts(shape: CollisionShape) -> bool:
-    """Tell whether each component is convex and has a hull of its own, as `auto` makes them."""
-    return shape.strategy == "hull" and len(shape.pieces) == shape.analysis.components > 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +171,8 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
         samples, gap = samples + len(on_mesh), max(gap, gap_mesh)
     volume = analysis.volume if analysis.components == 1 else float(owned.sum() * cell)
     solid = analysis.solid and volume > 0
-    reach_added, reach_lost = (_beyond_rounding(r, analysis.diagonal) for r in (reach_added, reach_lost))
+    # MuJoCo keeps corners as float32, which cannot tell less than this from nothing.
+    reach_added, reach_lost = (r if r > 1e-6 * analysis.diagonal else 0.0 for r in (reach_added, reach_lost))
     return Certificate(
         exact=False,
         volume_added=added,
@@ -187,11 +185,6 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
         fraction_added=added / volume if solid else None,
         fraction_lost=lost / volume if solid else None,
     )
-
-
-def _beyond_rounding(length: float, diagonal: float) -> float:
-    """Return 0 for what float32, in which MuJoCo keeps corners, cannot tell from it."""
-    return length if length > 1e-6 * diagonal else 0.0
 
 
 def _lattice(first: Floats, second: Floats, triangles: int) -> tuple[Floats, float, float]:

@@ -6,7 +6,7 @@ Cells are kept in groups of polygons with equally many corners.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,10 +49,7 @@ class Group:
     reach: Floats
     slopes: Floats
     height: Floats
-    tilted: Bools = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.tilted = np.zeros(len(self.members), dtype=np.bool_)
+    tilted: Bools
 
     def __len__(self) -> int:
         return len(self.members)
@@ -140,6 +137,7 @@ def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, he
         reach=-np.einsum("gkj,gkj->gk", inward, local),
         slopes=slopes,
         height=np.full(len(members), height),
+        tilted=np.zeros(len(members), dtype=np.bool_),
     )
 
 

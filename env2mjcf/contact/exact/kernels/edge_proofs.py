@@ -65,12 +65,13 @@ def edge_is_free(
         place_at(tables, room, start, delta, middle)
         left = last
         for i in range(first, last):
-            speed = _speed(tables, speeds, pair_speeds, pending[i])
-            state = _look(tables, room, pending[i], speed, drifts, turns, half, margin)
+            code = pending[i]
+            speed = pair_speeds[~code] if code < 0 else speeds[code // len(tables.obstacles)]
+            state = _look(tables, room, code, speed, drifts, turns, half, margin)
             if state == _TOO_NEAR:
                 return False
             if state == _OPEN:
-                pending[left] = pending[i]
+                pending[left] = code
                 left += 1
         if left == last:
             continue
@@ -121,11 +122,6 @@ def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: flo
             pending[count] = ~i
             count += 1
     return count
-
-
-@compiled
-def _speed(tables: Tables, speeds: Any, pair_speeds: Any, code: int) -> float:
-    return pair_speeds[~code] if code < 0 else speeds[code // len(tables.obstacles)]
 
 
 @compiled

@@ -100,19 +100,16 @@ def triangle_meets(a: Triangle, row: Any) -> bool:
     if meeting == 0:
         return False
     for k in range(BLOCK):
-        if meeting >> k & 1 and not _apart_in_plane(a, corners(row, k)):
-            return True
+        if meeting >> k & 1:
+            b = corners(row, k)
+            if not (_beside(a, b) or _beside(b, a)):
+                return True
     return False
 
 
 @compiled
-def _apart_in_plane(a: Triangle, b: Triangle) -> bool:
-    """Return whether triangles are apart along the normal of an edge in their own plane."""
-    return _beside(a, b) or _beside(b, a)
-
-
-@compiled
 def _beside(a: Triangle, b: Triangle) -> bool:
+    """Return whether triangles are apart along the normal of an edge of the first in its own plane."""
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = a
     n0, n1, n2 = cross(b0 - a0, b1 - a1, b2 - a2, c0 - b0, c1 - b1, c2 - b2)
     for k in range(3):
