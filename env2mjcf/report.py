@@ -93,7 +93,7 @@ def report(compiled: Compiled) -> Report:
     counts: dict[str, int] = {}
     for diagnostic in compiled.diagnostics:
         counts[diagnostic.severity.value] = counts.get(diagnostic.severity.value, 0) + 1
-    links = [p for r in assembly.robots for p in r.links]
+    links = assembly.links
     return Report(
         name=environment.name,
         dialect=environment.dialect.value,

@@ -40,7 +40,7 @@ class ContactQueries:
 
     def __init__(self, compiled: Compiled, model: mujoco.MjModel, static: tuple[Contact, ...] | None = None) -> None:
         assembly, document = compiled.assembly, compiled.document
-        self.links = [p for r in assembly.robots for p in r.links]
+        self.links = assembly.links
         self._compiled = compiled
         # Looking for numba takes longer than a verdict.
         self._compiles = available()

@@ -11,8 +11,8 @@ from ..errors import Span
 from ..limits import Work
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
-from .orientation import inside_out, rewound, wound_alike
-from .topology import RELATIVE_TOLERANCE, Floats, Ints, cleaned, edges, face_areas, face_components, face_volumes
+from .orientation import disagreeing, inside_out, wound_alike
+from .topology import RELATIVE_TOLERANCE, Floats, Ints, cleaned, face_areas, face_components, face_volumes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,23 +104,28 @@ def analyse(mesh: Mesh, work: Work | None = None) -> Analysis:
     tolerance = RELATIVE_TOLERANCE * diagonal
     dimension, normal = _dimension(points, tolerance)
     clean = cleaned(points, np.searchsorted(used, mesh.faces), tolerance, dimension)
-    faces, table = clean.faces, clean.edges
-    consistent = oriented = wound_alike(table)
+    faces, turned = clean.faces, np.zeros(len(clean.faces), dtype=np.bool_)
+    consistent = oriented = wound_alike(clean.deciding)
     if not consistent:
-        faces, oriented = rewound(faces)
+        wrong = disagreeing(clean.edges)
+        oriented = wrong is not None
+        if wrong is not None:
+            turned, faces = wrong, np.where(wrong[:, None], faces[:, ::-1], faces)
 
-    component = face_components(edges(faces))
+    component = face_components(clean.edges)
     volumes = np.bincount(component, face_volumes(points, faces) / 6.0).astype(np.float64)
     signed_volume = float(volumes.sum())
     if clean.closed and oriented:
         flipped = inside_out(points, faces, component, volumes, work or Work())
     else:
         flipped = np.zeros(len(volumes), dtype=np.bool_)
+    turned = turned ^ flipped[component]
     faces = np.where(flipped[component, None], faces[:, ::-1], faces)
     volumes = np.where(flipped, -volumes, volumes)
     left, faces = np.unique(faces, return_inverse=True)
     vertices, faces = points[left], faces.reshape(-1, 3).astype(np.int64)
-    convex = clean.closed and len(volumes) == 1 and is_convex(vertices, faces, tolerance)
+    single = clean.closed and len(volumes) == 1
+    convex = single and is_convex(vertices, faces, tolerance, clean.edges.turned(turned))
     for array in (vertices, faces, clean.source, component, volumes, normal):
         array.setflags(write=False)
     return Analysis(
@@ -143,8 +148,8 @@ def analyse(mesh: Mesh, work: Work | None = None) -> Analysis:
         degenerate_faces=clean.degenerate,
         duplicate_faces=clean.duplicates,
         unused_vertices=len(mesh.vertices) - len(used),
-        open_edges=int((table.faces % 2 == 1).sum()),
-        crowded_edges=int((table.faces > 2).sum()),
+        open_edges=int((clean.deciding.faces % 2 == 1).sum()),
+        crowded_edges=int((clean.deciding.faces > 2).sum()),
     )
 
 
@@ -184,11 +189,8 @@ def mesh_diagnostics(
     if analysis.flat:
         warn("GEO230", "all points lie in one plane: the mesh is a sheet without inside", "it collides as a thin plate")
     elif not analysis.closed:
-        warn(
-            "GEO232",
-            f"the surface is open: {analysis.open_edges} edges border an odd number of triangles",
-            "it collides as a sheet: a body wholly inside it does not count as touching",
-        )
+        message = f"the surface is open: {analysis.open_edges} edges border an odd number of triangles"
+        warn("GEO232", message, "it collides as a sheet: a body wholly inside it does not count as touching")
     # A sheet has no outside, so that its winding says nothing.
     if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
@@ -210,10 +212,6 @@ def refuse_without_area(analysis: Analysis, log: DiagnosticLog, subject: str, sp
         GeometryError: Always.
     """
     what = ("a point", "a line")[min(analysis.dimension, 1)]
-    log.fail(
-        "GEO231",
-        subject,
-        f"the mesh has no area: its faces collapse to {what}" if analysis.diagonal else "the mesh has no area",
-        hint="a body needs a surface to collide; give it triangles, or leave the body out",
-        span=span,
-    )
+    message = "the mesh has no area" + (f": its faces collapse to {what}" if analysis.diagonal else "")
+    hint = "a body needs a surface to collide; give it triangles, or leave the body out"
+    log.fail("GEO231", subject, message, hint=hint, span=span)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from .analysis import Analysis
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .mesh import Mesh, load_mesh
-from .repair import Repaired, repair_diagnostics, repaired
+from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 from .store import GeometryCache, default_folder
@@ -117,9 +116,14 @@ class Assembly:
         """Clearance or depth, in metres, beyond which verdicts are certain: both bodies of a pair may be off."""
         return 2 * max((p.certificate.band for p in self.parts() if p.certificate is not None), default=0.0)
 
+    @property
+    def links(self) -> tuple[Part, ...]:
+        """The bodies of all robots, in file order."""
+        return tuple(p for r in self.robots for p in r.links)
+
     def parts(self) -> tuple[Part, ...]:
         """Return all bodies: robots, obstacles, surfaces."""
-        return (*(p for r in self.robots for p in r.links), *self.obstacles, *self.surfaces)
+        return (*self.links, *self.obstacles, *self.surfaces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +156,8 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     for i, multibody in enumerate(environment.multibodies):
         kinematics = RobotKinematics.of(multibody, log)
         home = kinematics.home(log)
-        with _overflow_is_seen_later():
+        # `_bounding_box` finds what overflows.
+        with np.errstate(over="ignore", invalid="ignore"):
             poses = kinematics.forward(home)
         bodies = [
             _Placed(name, body, pose, meshes.mesh(body))
@@ -188,10 +193,8 @@ class _Meshes:
         self._paths = resolve_all(environment, options, log)
         self._raw: dict[Path, Mesh] = {}
         self._meshes: dict[tuple[Path, Recentring], Mesh] = {}
-        self._analyses: dict[Mesh, Analysis] = {}
-        self._shapes: dict[Mesh, CollisionShape] = {}
-        self._certificates: dict[Mesh, Certificate] = {}
-        self._work: dict[Mesh, Work] = {}
+        self._analyses: dict[Mesh, tuple[Analysis, Work]] = {}
+        self._shapes: dict[Mesh, tuple[CollisionShape, Certificate]] = {}
         self._elements = 0
         self._cells = 0
 
@@ -204,51 +207,48 @@ class _Meshes:
                 self._raw[path] = load_mesh(path, self._log, self._options.limits)
             self._meshes[key] = self._raw[path].recentred(body.recentring).scaled(self._options.scale)
         self._elements += len(self._meshes[key].faces)
-        if self._elements > self._options.limits.scene_elements:
-            at_most = self._options.limits.scene_elements
-            self._refuse("GEO271", body, f"more than {at_most} triangles in all", "scene_elements")
+        self._at_most("scene_elements", self._elements, "GEO271", "triangles", body)
         return self._meshes[key]
 
     def part(self, placed: _Placed, thickness: float | None, *, moves: bool) -> Part:
         """Give a placed body its shape (none without a thickness) and its inertia (where it moves)."""
         mesh, body, options = placed.mesh, placed.body, self._options
         if mesh not in self._analyses:
-            result = self._repaired(mesh, body)
-            self._analyses[mesh] = result.analysis
+            work = Work(options.limits.mesh_work)
+            with bounded(options.limits, self._log, body.filename, body.span):
+                result = repaired(mesh, work)
+            self._analyses[mesh] = result.analysis, work
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
-        analysis = self._analyses[mesh]
-        if thickness is not None and mesh not in self._shapes:
-            self._shape(mesh, analysis, thickness, body)
-        shape = None if thickness is None else self._shapes[mesh]
-        self._cells += 0 if shape is None else len(shape.pieces)
-        if self._cells > options.limits.scene_cells:
-            at_most = options.limits.scene_cells
-            self._refuse("GEO272", body, f"more than {at_most} convex pieces in all", "scene_cells")
-        proof = None if thickness is None else self._certificates[mesh]
+        analysis, work = self._analyses[mesh]
+        shape = proof = None
+        if thickness is not None:
+            if mesh not in self._shapes:
+                self._shapes[mesh] = self._shaped(mesh, analysis, thickness, body, work)
+            shape, proof = self._shapes[mesh]
+            self._cells += len(shape.pieces)
+            self._at_most("scene_cells", self._cells, "GEO272", "convex pieces", body)
         inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None
         if inertia is not None and inertia.note:
             self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
         return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia, proof)
 
-    def _refuse(self, code: str, body: Body, what: str, limit: str) -> NoReturn:
-        message = f"the bodies up to this one have {what}, which is the limit"
-        self._log.fail(code, body.filename, message, hint=Limits.hint(limit), span=body.span)
+    def _at_most(self, limit: str, count: int, code: str, what: str, body: Body) -> None:
+        most = getattr(self._options.limits, limit)
+        if count > most:
+            message = f"the bodies up to this one have more than {most} {what} in all, which is the limit"
+            self._log.fail(code, body.filename, message, hint=Limits.hint(limit), span=body.span)
 
-    def _repaired(self, mesh: Mesh, body: Body) -> Repaired:
-        work = self._work[mesh] = Work(self._options.limits.mesh_work)
-        with bounded(self._options.limits, self._log, body.filename, body.span):
-            return repaired(mesh, work)
-
-    def _shape(self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body) -> None:
+    def _shaped(
+        self, mesh: Mesh, analysis: Analysis, thickness: float, body: Body, work: Work
+    ) -> tuple[CollisionShape, Certificate]:
         strategy, log, cache = self._options.collision, self._log, self._cache
-        work = self._work[mesh]
         with bounded(self._options.limits, log, body.filename, body.span):
             shape = collision_shape(mesh, analysis, strategy, thickness, log, body.filename, body.span, cache, work)
-        self._shapes[mesh] = shape
-        self._certificates[mesh] = proof = certificate(shape, thickness, cache, log)
+        proof = certificate(shape, thickness, cache, log)
         if shape.strategy == "coacd":
             hint = "collision='auto' collides the true shape"
             log.info("GEO263", body.filename, f"{shape.note}: {proof}", hint=hint, span=body.span)
+        return shape, proof
 
 
 def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
@@ -262,19 +262,14 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
                 log.fail("KIN320", "SMAJoint", message, hint="replace it by Revolute joints", span=connection.span)
 
 
-def _overflow_is_seen_later() -> np.errstate:
-    return np.errstate(over="ignore", invalid="ignore")
-
-
 def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array, Array]:
     """Return the corners of the box around the used vertices of all bodies; the unit cube for no bodies."""
     if not bodies:
         return np.full(3, -0.5), np.full(3, 0.5)
     corners: list[Array] = []
     for b in bodies:
-        used = b.mesh.vertices[np.unique(b.mesh.faces)]
-        with _overflow_is_seen_later():
-            world = used @ b.pose[:3, :3].T + b.pose[:3, 3]
+        with np.errstate(over="ignore", invalid="ignore"):
+            world = b.mesh.used_vertices @ b.pose[:3, :3].T + b.pose[:3, 3]
         farthest = float(np.abs(world).max())
         # Not a number compares as false.
         if not farthest <= LARGEST:

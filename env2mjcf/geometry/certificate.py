@@ -10,11 +10,11 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from .distance import distances, spread
-from .orientation import winding_numbers
+from .orientation import encloses
 from .pieces import hull_faces, hull_volume
 from .shapes import CollisionShape
 from .store import GeometryCache
-from .topology import Bools, Floats, Ints
+from .topology import Bools, Floats, Ints, area_vectors
 
 APPROXIMATE = ("hull", "coacd")
 """Strategies whose verdicts may be wrong by more than the tolerance of contact."""
@@ -109,16 +109,13 @@ def certify(shape: CollisionShape, thickness: float) -> Certificate:
         thickness: That it was made with.
     """
     analysis = shape.analysis
-    if shape.strategy not in APPROXIMATE or analysis.convex or _exact_parts(shape):
+    # As `auto` makes them: each component is convex and has a hull of its own.
+    parts = shape.strategy == "hull" and len(shape.pieces) == analysis.components > 1
+    if shape.strategy not in APPROXIMATE or analysis.convex or parts:
         surface = shape.strategy == "surface" and not shape.needs_containment
         lost = analysis.volume if surface and analysis.solid else 0.0
         return Certificate(True, 0.0, lost, thickness, thickness, thickness, 0, 0.0, 0.0, 1.0 if lost else 0.0)
     return _measured(shape, thickness)
-
-
-def _exact_parts(shape: CollisionShape) -> bool:
-    """Tell whether each component is convex and has a hull of its own, as `auto` makes them."""
-    return shape.strategy == "hull" and len(shape.pieces) == shape.analysis.components > 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,8 +139,7 @@ def _pieces(shape: CollisionShape) -> _Pieces:
     faces = hull_faces([piece.vertices for piece in shape.pieces])
     planes: list[tuple[Floats, Floats]] = []
     for cloud, own in zip(clouds, faces, strict=True):
-        corners = cloud[own]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = area_vectors(cloud[own])
         length = np.linalg.norm(normals, axis=1)
         normals = normals[length > 0] / length[length > 0, None]
         # The farthest corner, so that float32 in the hull lets no point of the cloud out.
@@ -175,7 +171,8 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
         samples, gap = samples + len(on_mesh), max(gap, gap_mesh)
     volume = analysis.volume if analysis.components == 1 else float(owned.sum() * cell)
     solid = analysis.solid and volume > 0
-    reach_added, reach_lost = (_beyond_rounding(r, analysis.diagonal) for r in (reach_added, reach_lost))
+    # MuJoCo keeps corners as float32, which cannot tell less than this from nothing.
+    reach_added, reach_lost = (r if r > 1e-6 * analysis.diagonal else 0.0 for r in (reach_added, reach_lost))
     return Certificate(
         exact=False,
         volume_added=added,
@@ -188,11 +185,6 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
         fraction_added=added / volume if solid else None,
         fraction_lost=lost / volume if solid else None,
     )
-
-
-def _beyond_rounding(length: float, diagonal: float) -> float:
-    """Return 0 for what float32, in which MuJoCo keeps corners, cannot tell from it."""
-    return length if length > 1e-6 * diagonal else 0.0
 
 
 def _lattice(first: Floats, second: Floats, triangles: int) -> tuple[Floats, float, float]:
@@ -211,11 +203,11 @@ def _in_solid(points: Floats, shape: CollisionShape) -> Bools:
     analysis = shape.analysis
     if not analysis.solid:
         return np.zeros(len(points), dtype=np.bool_)
-    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces)) > 0.5
+    return encloses(analysis.vertices, analysis.faces, points)
 
 
 def _reach(points: Floats, apart: Floats, inside: Callable[[Floats], Bools]) -> float:
-    """Return the greatest of the distances of points that are not inside; the farthest are asked first."""
+    """Return the greatest of the distances of points that are not inside; the farthest are tested first."""
     order = np.argsort(-apart, kind="stable")
     for i in range(0, len(order), _BATCH):
         some = order[i : i + _BATCH]

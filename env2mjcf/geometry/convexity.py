@@ -1,4 +1,4 @@
-"""Is a closed surface the boundary of its own hull, and is that hull a box."""
+"""Whether a closed surface is the boundary of its own hull, and whether that hull is a box."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .topology import Floats, Ints, edges
+from .topology import Edges, Floats, Ints, area_vectors, edges
 
 _BLOCK = 4_000_000  # distances held in memory at once
 
@@ -26,7 +26,7 @@ class Box:
     rotation: Floats
 
 
-def is_convex(vertices: Floats, faces: Ints, tolerance: float) -> bool:
+def is_convex(vertices: Floats, faces: Ints, tolerance: float, table: Edges | None = None) -> bool:
     """Tell whether every vertex lies within `tolerance` behind the plane of every face.
 
     The surface must be closed; its winding does not matter, because the mean of its vertices is inside a convex one.
@@ -35,17 +35,22 @@ def is_convex(vertices: Floats, faces: Ints, tolerance: float) -> bool:
         vertices: (n, 3), all used by `faces`.
         faces: (m, 3) without degenerate ones.
         tolerance: Length.
+        table: `edges(faces)`, where it is known.
     """
     if len(faces) < 4:
         return False
     normals, offsets = _planes_from_mean(vertices, faces)
     limits = offsets + tolerance
-    return _edges_bulge(vertices, faces, normals, limits) and _all_behind(vertices, *_distinct(normals, limits))
+    if not _edges_bulge(vertices, faces, table or edges(faces), normals, limits):
+        return False
+    # Planes that are equal to the last bit, as those of a tessellated flat side often are, count once.
+    planes = np.unique(np.column_stack([normals, limits]), axis=0)
+    return _all_behind(vertices, planes[:, :3], planes[:, 3])
 
 
 def _planes_from_mean(vertices: Floats, faces: Ints) -> tuple[Floats, Floats]:
     corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = area_vectors(corners)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     heights = np.einsum("ij,ij->i", normals, corners.mean(axis=1) - vertices.mean(axis=0))
     normals[heights < 0] *= -1
@@ -53,23 +58,14 @@ def _planes_from_mean(vertices: Floats, faces: Ints) -> tuple[Floats, Floats]:
     return normals, np.einsum("ij,ikj->ik", normals, corners).max(axis=1)
 
 
-def _edges_bulge(vertices: Floats, faces: Ints, normals: Floats, limits: Floats) -> bool:
+def _edges_bulge(vertices: Floats, faces: Ints, table: Edges, normals: Floats, limits: Floats) -> bool:
     """Test each face against the neighbours only: linear in time, and most non-convex meshes end here."""
-    table = edges(faces)
-    order = np.argsort(table.of_corner.ravel(), kind="stable")
-    edge, corner = table.of_corner.ravel()[order], order
-    linked = np.flatnonzero(edge[1:] == edge[:-1])
-    for here, there in ((corner[linked], corner[linked + 1]), (corner[linked + 1], corner[linked])):
+    first, second, _ = table.neighbours()
+    for here, there in ((first, second), (second, first)):
         face, opposite = here // 3, faces[there // 3, (there % 3 + 2) % 3]
         if (np.einsum("ij,ij->i", normals[face], vertices[opposite]) > limits[face]).any():
             return False
     return True
-
-
-def _distinct(normals: Floats, limits: Floats) -> tuple[Floats, Floats]:
-    """Drop planes that are equal to the last bit, as those of a tessellated flat side often are."""
-    planes = np.unique(np.column_stack([normals, limits]), axis=0)
-    return planes[:, :3], planes[:, 3]
 
 
 def _all_behind(vertices: Floats, normals: Floats, limits: Floats) -> bool:
@@ -122,8 +118,7 @@ def exact_box(vertices: Floats, faces: Ints, tolerance: float) -> Box | None:
         faces: (m, 3) of a convex surface.
         tolerance: Length by which a corner may be off.
     """
-    corners = vertices[faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = area_vectors(vertices[faces])
     sizes = np.linalg.norm(areas, axis=1)
     normals = areas / sizes[:, None]
     first = normals[np.argmax(sizes)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .topology import Floats, Ints, edges
+from .topology import Edges, Floats, Ints, area_vectors, edges
 
 PARALLEL = 1.0 - 1e-12
 """Cosine of the angle from which on two normals are one."""
@@ -32,7 +32,7 @@ class Polygon:
     faces: tuple[int, ...]
 
 
-def convex_polygons(vertices: Floats, faces: Ints, tolerance: float) -> tuple[Polygon, ...]:
+def convex_polygons(vertices: Floats, faces: Ints, tolerance: float, table: Edges | None = None) -> tuple[Polygon, ...]:
     """Cover the surface with convex polygons made of whole triangles.
 
     Removes the longest edges between coplanar triangles first, as long as the result stays convex (Hertel and
@@ -42,37 +42,51 @@ def convex_polygons(vertices: Floats, faces: Ints, tolerance: float) -> tuple[Po
         vertices: (n, 3).
         faces: (m, 3) without degenerate ones.
         tolerance: Length by which a merged vertex may be off the plane.
+        table: `edges(faces)`, where it is known.
 
     Returns:
         Polygons in the order of their first triangles.
     """
     if len(faces) == 0:
         return ()
-    corners = vertices[faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = area_vectors(vertices[faces])
     merger = _Merger(vertices, faces, areas, tolerance)
-    for left, right, a, b in _candidates(vertices, faces, areas, tolerance):
+    for left, right, a, b in _candidates(vertices, faces, table or edges(faces), areas, tolerance):
         merger.merge(left, right, a, b)
     return merger.polygons()
 
 
-def _candidates(vertices: Floats, faces: Ints, areas: Floats, tolerance: float) -> list[tuple[int, int, int, int]]:
-    """Return (left face, right face, a, b) of edges a-b between coplanar faces, the longest first."""
-    table = edges(faces)
-    order = np.argsort(table.of_corner.ravel(), kind="stable")
-    edge = table.of_corner.ravel()[order]
-    twice = np.flatnonzero((edge[1:] == edge[:-1]) & ((table.faces == 2) & (table.balance == 0))[edge[:-1]])
-    here, there = order[twice], order[twice + 1]
+def flat_neighbours(
+    vertices: Floats, faces: Ints, table: Edges, normals: Floats, tolerance: float
+) -> tuple[Ints, Ints, Ints, Floats]:
+    """Find the faces that lie in one plane with a neighbour, at an edge that only the two have and walk both ways.
+
+    Returns:
+        The corners of the two faces from which the edge leads, the edge, and the cosine of their normals, (p,) each.
+    """
+    here, there, edge = table.neighbours()
+    own = ((table.faces == 2) & (table.balance == 0))[edge]
+    here, there, edge = here[own], there[own], edge[own]
     left, right = here // 3, there // 3
-    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    parallel = np.einsum("ij,ij->i", normals[left], normals[right]) > PARALLEL
+    cosine = np.einsum("ij,ij->i", normals[left], normals[right])
     apart = vertices[faces[right, (there + 2) % 3]] - vertices[faces[left, here % 3]]
     level = np.abs(np.einsum("ij,ij->i", normals[left], apart)) <= tolerance
-    chosen = np.flatnonzero(parallel & level)
+    flat = (np.abs(cosine) > PARALLEL) & level
+    return here[flat], there[flat], edge[flat], cosine[flat]
+
+
+def _candidates(
+    vertices: Floats, faces: Ints, table: Edges, areas: Floats, tolerance: float
+) -> list[tuple[int, int, int, int]]:
+    """Return (left face, right face, a, b) of edges a-b between coplanar faces, the longest first."""
+    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    here, there, edge, cosine = flat_neighbours(vertices, faces, table, normals, tolerance)
+    here, there, edge = here[cosine > 0], there[cosine > 0], edge[cosine > 0]
+    left, right = here // 3, there // 3
     a, b = faces[left, here % 3], faces[left, (here + 1) % 3]
     length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    chosen = chosen[np.lexsort((edge[twice][chosen], -length[chosen]))]
-    return np.column_stack([left, right, a, b])[chosen].tolist()
+    order = np.lexsort((edge, -length))
+    return np.column_stack([left, right, a, b])[order].tolist()
 
 
 class _Merger:

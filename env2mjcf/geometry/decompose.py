@@ -1,22 +1,28 @@
-"""Approximate convex decomposition by CoACD, in a child process: a crash or a hang there is an error here."""
+"""Approximate convex decomposition by CoACD, in a child process: a crash or a hang there is an error here.
+
+The child runs this file as a script, without the rest of the package.
+"""
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .topology import Floats, Ints
+if TYPE_CHECKING:
+    from .topology import Floats, Ints
 
 THRESHOLD = 0.05
 """How concave a part may stay, in CoACD's measure and its default; 1 is wholly."""
 
-_WORKER = Path(__file__).with_name("decompose_worker.py")
+_WORKER = Path(__file__)
 _SECONDS = 900.0
 
 
@@ -71,3 +77,18 @@ def _run(command: list[str]) -> None:
         how = f"signal {-finished.returncode}" if finished.returncode < 0 else f"status {finished.returncode}"
         said = [line for line in finished.stderr.decode(errors="replace").splitlines() if line.strip()]
         raise DecompositionError(f"CoACD crashed ({how}){f': {said[-1]}' if said else ''}")
+
+
+def _decompose(source: str, target: str, threshold: str) -> None:
+    """Decompose the mesh of one file into another file of corners, part after part: what the child does."""
+    # As Any: it has no type hints.
+    coacd: Any = importlib.import_module("coacd")
+    coacd.set_log_level("error")
+    with np.load(source, allow_pickle=False) as mesh:
+        parts = coacd.run_coacd(coacd.Mesh(mesh["vertices"], mesh["faces"]), threshold=float(threshold), seed=0)
+    corners = [np.asarray(vertices, dtype=np.float64).reshape(-1, 3) for vertices, _ in parts]
+    np.savez(target, corners=np.concatenate([np.zeros((0, 3)), *corners]), lengths=[len(c) for c in corners])
+
+
+if __name__ == "__main__":
+    _decompose(*sys.argv[1:])

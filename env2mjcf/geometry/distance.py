@@ -1,10 +1,7 @@
-"""Exact distance of pairs of triangles, many pairs at once.
+"""Exact distances of triangles from triangles and of points from triangles, many at once; points spread over triangles.
 
 Every answer is the distance of two points that really lie on the two triangles, so rounding can only make it too
 large, never too small; degenerate triangles need no case of their own.
-
-
-MERGED: Distances of points from triangles, and points spread over triangles.
 """
 
 from __future__ import annotations
@@ -13,9 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .topology import Bools, Floats, Ints, face_areas
+from .topology import Bools, Floats, Ints, area_vectors, face_areas
 
 _TINY = np.finfo(np.float64).tiny
+_BLOCK = 2_000_000  # pairs of points and triangles held in memory at once
+_FINEST = 64
+
+_Family = tuple[Floats, Floats, Floats]  # squared distances (k, c), points on a and on b (k, c, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,9 +45,6 @@ def nearest(a: Floats, b: Floats) -> Nearest:
     on_a, on_b = (np.concatenate([f[i] for f in families], axis=1) for i in (1, 2))
     on_a, on_b = (np.take_along_axis(p, best[..., None], axis=1)[:, 0] for p in (on_a, on_b))
     return Nearest(np.sqrt(np.take_along_axis(squares, best, axis=1)[:, 0]), on_a, on_b)
-
-
-_Family = tuple[Floats, Floats, Floats]  # squared distances (k, c), points on a and on b (k, c, 3)
 
 
 def _flipped(family: _Family) -> _Family:
@@ -83,7 +81,7 @@ def _corners(a: Floats, b: Floats) -> _Family:
 
 def _crossings(a: Floats, b: Floats) -> _Family:
     """Find where edges of a pass through b."""
-    normal = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+    normal = area_vectors(b)
     height = np.einsum("kci,ki->kc", a - b[:, None, 0], normal)
     other = np.roll(height, -1, axis=1)
     through = (np.minimum(height, other) <= 0) & (np.maximum(height, other) >= 0) & (height != other)
@@ -105,10 +103,6 @@ def _projected(points: Floats, b: Floats) -> tuple[Floats, Bools]:
     w = np.divide(ff * sp - fs * fp, area, out=np.full_like(fp, -1.0), where=sound)
     within = sound & (v >= 0) & (w >= 0) & (v + w <= 1)
     return b[:, None, 0] + v[..., None] * first + w[..., None] * second, within
-
-
-_BLOCK = 2_000_000  # pairs of points and triangles held in memory at once
-_FINEST = 64
 
 
 def distances(points: Floats, vertices: Floats, faces: Ints) -> Floats:
@@ -141,7 +135,7 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
     """Return the distance of each point (k, 3) from its triangle (k, 3, 3)."""
     best = np.full(len(points), np.inf)
     inside = np.ones(len(points), dtype=np.bool_)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     for i in range(3):
         start, along = corners[:, i], corners[:, (i + 1) % 3] - corners[:, i]
         to = points - start

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .analysis import Analysis
-from .coplanar import PARALLEL
+from .coplanar import flat_neighbours
 from .planar import triangulated
-from .topology import Bools, Edges, Floats, Ints, connected, edges
+from .topology import Bools, Floats, Ints, area_vectors, connected, edges
 
 _MOST_FACES = 1000
 """Faces of a patch beyond which it is left alone."""
@@ -50,8 +50,7 @@ def unfolded(analysis: Analysis) -> Unfolded | None:
         analysis: Of a `solid` mesh.
     """
     vertices, faces = analysis.vertices, analysis.faces
-    corners = vertices[faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = area_vectors(vertices[faces])
     normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
     keep = np.ones(len(faces), dtype=np.bool_)
     new: list[Ints] = []
@@ -76,24 +75,10 @@ def unfolded(analysis: Analysis) -> Unfolded | None:
 
 def _folded_patches(analysis: Analysis, normals: Floats) -> list[Ints]:
     """Return the faces of each connected flat patch in which neighbours have opposite normals."""
-    left, right, cosine = _flat_neighbours(analysis, edges(analysis.faces), normals)
-    label = connected(len(normals), left, right)
-    return [np.flatnonzero(label == p) for p in np.unique(label[left[cosine < 0]]).tolist()]
-
-
-def _flat_neighbours(analysis: Analysis, table: Edges, normals: Floats) -> tuple[Ints, Ints, Floats]:
-    """Return the pairs of faces that lie in one plane at an edge of their own, and the cosines of their normals."""
-    faces, vertices = analysis.faces, analysis.vertices
-    order = np.argsort(table.of_corner.ravel(), kind="stable")
-    edge = table.of_corner.ravel()[order]
-    twice = np.flatnonzero((edge[1:] == edge[:-1]) & ((table.faces == 2) & (table.balance == 0))[edge[:-1]])
-    here, there = order[twice], order[twice + 1]
-    left, right = here // 3, there // 3
-    cosine = np.einsum("ij,ij->i", normals[left], normals[right])
-    apart = vertices[faces[right, (there + 2) % 3]] - vertices[faces[left, here % 3]]
-    level = np.abs(np.einsum("ij,ij->i", normals[left], apart)) <= analysis.tolerance
-    flat = (np.abs(cosine) > PARALLEL) & level
-    return left[flat], right[flat], cosine[flat]
+    vertices, faces = analysis.vertices, analysis.faces
+    here, there, _, cosine = flat_neighbours(vertices, faces, edges(faces), normals, analysis.tolerance)
+    label = connected(len(normals), here // 3, there // 3)
+    return [np.flatnonzero(label == p) for p in np.unique(label[here[cosine < 0] // 3]).tolist()]
 
 
 def _rebuilt(analysis: Analysis, patch: Ints, normal: Floats) -> tuple[Ints, Ints, int] | None:

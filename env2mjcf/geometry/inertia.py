@@ -10,7 +10,7 @@ import numpy as np
 from ..kinematics.transforms import quaternion_from_matrix
 from .analysis import Analysis
 from .mesh import Mesh
-from .topology import RELATIVE_TOLERANCE, Floats
+from .topology import RELATIVE_TOLERANCE, Floats, area_vectors
 
 SHELL_THICKNESS = 0.01
 """Thickness of the sheet that stands for a mesh without inside, in units of its diagonal."""
@@ -54,7 +54,7 @@ def inertial(mesh: Mesh, analysis: Analysis, density: float, mass: float | None 
     """
     notes: list[str] = []
     origin = analysis.vertices.mean(axis=0) if len(analysis.vertices) else np.zeros(3)
-    if _encloses(analysis):
+    if analysis.solid and analysis.volume > RELATIVE_TOLERANCE * analysis.area * analysis.diagonal:
         volume, com, second = _solid(analysis.vertices[analysis.faces] - origin)
     else:
         thickness = SHELL_THICKNESS * analysis.diagonal
@@ -83,10 +83,6 @@ def inertial(mesh: Mesh, analysis: Analysis, density: float, mass: float | None 
     return Inertial(total, com, quat, diagonal, "; ".join(notes))
 
 
-def _encloses(analysis: Analysis) -> bool:
-    return analysis.solid and analysis.volume > RELATIVE_TOLERANCE * analysis.area * analysis.diagonal
-
-
 def _solid(triangles: Floats) -> tuple[float, Floats, Floats]:
     """Return volume, centroid and central second moments, integral of x x^T, of a polyhedron (m, 3, 3).
 
@@ -106,7 +102,7 @@ def _sheet(triangles: Floats, thickness: float) -> tuple[float, Floats, Floats]:
 
     A triangle of area A has the moments A/12 (a a^T + b b^T + c c^T + s s^T); its thickness t adds A t^2/12 n n^T.
     """
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    normals = area_vectors(triangles) / 2
     areas = np.linalg.norm(normals, axis=1)
     area = float(areas.sum())
     if area == 0:

@@ -1,7 +1,4 @@
-"""A triangle mesh in its body's frame.
-
-MERGED: Loads a mesh file of any format that is known.
-"""
+"""A triangle mesh in its body's frame, and how it is loaded from a file of any format that is known."""
 
 from __future__ import annotations
 
@@ -9,6 +6,7 @@ import hashlib
 import io
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,8 @@ from ..model.environment import Recentring
 from ..system.files import open_regular
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+# Without slots, so that what is computed of the arrays is kept.
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles over the vertex list of a file.
 
@@ -51,13 +50,22 @@ class Mesh:
         f.setflags(write=False)
         return cls(name, v, f, path)
 
+    @cached_property
+    def used_vertices(self) -> NDArray[np.float64]:
+        """The vertices that faces use, (k, 3), in the order of the file; read-only."""
+        used = np.unique(self.faces)
+        if len(used) == len(self.vertices):
+            return self.vertices
+        vertices = self.vertices[used]
+        vertices.setflags(write=False)
+        return vertices
+
     @property
     def diagonal(self) -> float:
         """Diagonal of the bounding box of the vertices that faces use."""
-        used = self.vertices[self.faces.reshape(-1)]
-        return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+        return float(np.linalg.norm(np.ptp(self.used_vertices, axis=0)))
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Hash of vertices and faces: equal for equal geometry, whatever the file is called."""
         h = hashlib.sha256()
@@ -122,7 +130,7 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
             log.fail("GEO274", str(path), message, hint="save it as UTF-8")
         vertices, faces = _READERS[extension](data, str(path), log, limits)
     else:
-        log.info("GEO208", str(path), f"{path} is no format of the original planner; read through trimesh")
+        log.info("GEO208", str(path), f"{path} is read through trimesh: the original planner did not read this format")
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
     largest = float(np.abs(vertices).max())
     if largest > LARGEST:

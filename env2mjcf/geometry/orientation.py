@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits import Work
-from .topology import Bools, Edges, Floats, Ints, connected, edges
+from .topology import Bools, Edges, Floats, Ints, by_component, connected
 
 _BLOCK = 2_000_000  # solid angles held in memory at once
 
@@ -15,27 +15,24 @@ def wound_alike(table: Edges) -> bool:
     return bool((np.abs(table.balance) <= table.faces % 2).all())
 
 
-def rewound(faces: Ints) -> tuple[Ints, bool]:
-    """Turn faces round until neighbours agree; in each patch the winding of the majority wins.
+def disagreeing(table: Edges) -> Bools | None:
+    """Return which faces to turn round so that neighbours agree, (m,); None where no winding makes all edges agree.
 
-    Returns:
-        The faces and True, or the faces as they were and False where no winding makes all edges agree.
+    In each patch the winding of the majority wins.
     """
-    table = edges(faces)
-    order = np.argsort(table.of_corner.ravel(), kind="stable")
-    edge = table.of_corner.ravel()[order]
-    pair = np.flatnonzero((edge[1:] == edge[:-1]) & (table.faces == 2)[edge[:-1]])
-    a, b, differ = order[pair] // 3, order[pair + 1] // 3, table.balance[edge[pair]] != 0
+    here, there, edge = table.neighbours()
+    pair = table.faces[edge] == 2
+    a, b, differ = here[pair] // 3, there[pair] // 3, table.balance[edge[pair]] != 0
     a, b, differ = np.concatenate([a, b]), np.concatenate([b, a]), np.concatenate([differ, differ])
-    patch = connected(len(faces), a, b)
-    turned, known = np.zeros((2, len(faces)), dtype=np.bool_)
+    patch = connected(len(table.of_corner), a, b)
+    turned, known = np.zeros((2, len(table.of_corner)), dtype=np.bool_)
     known[np.unique(patch, return_index=True)[1]] = True
     while (step := known[a] & ~known[b]).any():
         turned[b[step]] = turned[a[step]] ^ differ[step]
         known[b[step]] = True
     minority = np.bincount(patch, turned) * 2 <= np.bincount(patch)
-    out = np.where((turned == minority[patch])[:, None], faces[:, ::-1], faces)
-    return (out, True) if wound_alike(edges(out)) else (faces, False)
+    turned = turned == minority[patch]
+    return turned if wound_alike(table.turned(turned)) else None
 
 
 def winding_numbers(points: Floats, vertices: Floats, faces: Ints, work: Work | None = None) -> Floats:
@@ -62,6 +59,11 @@ def winding_numbers(points: Floats, vertices: Floats, faces: Ints, work: Work | 
     return out
 
 
+def encloses(vertices: Floats, faces: Ints, points: Floats, work: Work | None = None) -> Bools:
+    """Tell which points (k, 3) the surface winds around, (k,); see `winding_numbers`."""
+    return np.abs(winding_numbers(points, vertices, faces, work)) > 0.5
+
+
 def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, work: Work) -> Bools:
     """Tell which components of a closed, consistently wound surface are wound inside out, (c,).
 
@@ -78,8 +80,7 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, 
     flipped = np.zeros(len(volumes), dtype=np.bool_)
     if not (volumes < 0).any() or len(volumes) == 1:
         return volumes < 0
-    order = np.argsort(component, kind="stable")
-    groups = np.split(faces[order], np.cumsum(np.bincount(component))[:-1])
+    groups = by_component(faces, component)
     low = np.array([vertices[g.ravel()].min(axis=0) for g in groups])
     high = np.array([vertices[g.ravel()].max(axis=0) for g in groups])
     # The middle of a face stays clear of edges that components may share.
@@ -87,13 +88,9 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, 
     for i in np.flatnonzero(volumes < 0):
         work.spend(len(groups))
         around = np.flatnonzero((low <= low[i]).all(axis=1) & (high >= high[i]).all(axis=1))
-        if any(_holds(vertices, groups[j], probes[i : i + 1], work)[0] for j in around if j != i):
+        if any(encloses(vertices, groups[j], probes[i : i + 1], work)[0] for j in around if j != i):
             continue
         within = np.flatnonzero((low >= low[i]).all(axis=1) & (high <= high[i]).all(axis=1))
-        flipped[within[_holds(vertices, groups[i], probes[within], work)]] = True
+        flipped[within[encloses(vertices, groups[i], probes[within], work)]] = True
         flipped[i] = True
     return flipped
-
-
-def _holds(vertices: Floats, faces: Ints, points: Floats, work: Work) -> Bools:
-    return np.abs(winding_numbers(points, vertices, faces, work)) > 0.5

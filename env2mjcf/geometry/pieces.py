@@ -1,10 +1,7 @@
-"""Convex hulls: how much more space than the mesh one takes.
+"""Convex pieces, which are point sets that MuJoCo takes the hull of, and what those hulls are.
 
 trimesh needs scipy for hulls, which env2mjcf does not depend on. Pieces need no hull of their own, because MuJoCo
 takes the hull of the points that it is given; so MuJoCo is also asked for the volume of what it will collide.
-
-
-MERGED: Convex pieces: point sets that MuJoCo takes the hull of.
 """
 
 from __future__ import annotations
@@ -17,7 +14,17 @@ from typing import Any
 import numpy as np
 
 from .coplanar import Polygon
-from .topology import RELATIVE_TOLERANCE, Floats, Ints
+from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, area_vectors
+
+SLENDEREST = 5e-6
+"""Least width of a piece in units of its length: MuJoCo keeps mesh vertices as float32 (6e-8), and its qhull refuses
+points that are nearly coplanar."""
+
+LEAST_WIDTH = 1e-7
+"""Least width of a piece in metres: below 5e-15 square metres MuJoCo finds a mesh's surface too small."""
+
+_LEAST_AREA = 2e-14
+_BLOCK = 2_000_000  # distances from corners to edges that are computed at once
 
 
 def hull_volume(points: Floats) -> float:
@@ -30,16 +37,22 @@ def hull_volume(points: Floats) -> float:
     """
     # Imported here, because the rest of geometry/ works without MuJoCo, and as Any, because it has no type stubs.
     mujoco: Any = import_module("mujoco")
-    size = float(np.ptp(points, axis=0).max())
-    if size == 0:
+    if not np.ptp(points, axis=0).any():
         raise ValueError("the points coincide, so they have no hull")
     spec = mujoco.MjSpec()
-    local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
-    spec.add_mesh(name="hull", uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    size = _add_hull(mujoco, spec, "hull", points)
     body = spec.worldbody.add_body()
     body.add_freejoint()
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", density=1.0)
     return float(spec.compile().body_mass[1]) * size**3
+
+
+def _add_hull(mujoco: Any, spec: Any, name: str, points: Floats) -> float:
+    """Add points to a specification as a mesh of size 1 about the origin, and return their size."""
+    size = float(np.ptp(points, axis=0).max()) or 1.0
+    local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
+    spec.add_mesh(name=name, uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    return size
 
 
 def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
@@ -54,9 +67,7 @@ def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
     mujoco: Any = import_module("mujoco")
     spec = mujoco.MjSpec()
     for i, points in enumerate(clouds):
-        size = float(np.ptp(points, axis=0).max()) or 1.0
-        local = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / size
-        spec.add_mesh(name=str(i), uservert=local.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+        _add_hull(mujoco, spec, str(i), points)
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=str(i))
     model = spec.compile()
     out: list[Ints] = []
@@ -64,8 +75,7 @@ def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
         start, count = model.mesh_faceadr[i], model.mesh_facenum[i]
         faces = model.mesh_face[start : start + count].astype(np.int64)
         corners = points[faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        inward = np.einsum("ij,ij->i", normals, corners[:, 0] - points[np.unique(faces)].mean(axis=0)) < 0
+        inward = np.einsum("ij,ij->i", area_vectors(corners), corners[:, 0] - points[np.unique(faces)].mean(axis=0)) < 0
         faces[inward] = faces[inward, ::-1]
         out.append(faces)
     return out
@@ -74,19 +84,6 @@ def hull_faces(clouds: Sequence[Floats]) -> list[Ints]:
 def hull_triangles(points: Floats) -> Floats:
     """Return the triangles of the convex hull of points that are not coplanar, (m, 3, 3); see `hull_faces`."""
     return points[hull_faces([points])[0]]
-
-
-SLENDEREST = 5e-6
-"""Least width of a piece in units of its length: MuJoCo keeps mesh vertices as float32 (6e-8), and its qhull refuses
-points that are nearly coplanar."""
-
-LEAST_WIDTH = 1e-7
-"""Least width of a piece in metres: below 5e-15 square metres MuJoCo finds a mesh's surface too small."""
-
-_LEAST_AREA = 2e-14
-
-# Distances from corners to edges that are computed at once.
-_BLOCK = 2_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +118,7 @@ def hull_piece(points: Floats, thickness: float) -> ConvexPiece:
         if width < least:
             reach = (thickness if width < least / 1000 else least) - width
             local = np.concatenate([local + axis * (reach / 2), local - axis * (reach / 2)])
-    return _frozen(local, center)
+    return frozen_piece(local, center)
 
 
 def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inward: bool) -> tuple[ConvexPiece, ...]:
@@ -155,7 +152,7 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
                 rectangle = _widened(local[row], normals[row], thickness)
                 if _surfaces(rectangle[None], thickness)[0] >= _LEAST_AREA:
                     whole = np.concatenate([rectangle + shift[row, 0], rectangle + shift[row, 1]])
-                    out[i] = _frozen(whole, centers[row], polygons[i])
+                    out[i] = frozen_piece(whole, centers[row], polygons[i])
             elif surfaces[row] >= _LEAST_AREA:
                 out[i] = ConvexPiece(points[row], centers[row], polygons[i])
     return tuple(piece for piece in out if piece is not None)
@@ -225,7 +222,7 @@ def _widths(local: Floats, normals: Floats) -> Floats:
     return out
 
 
-def too_narrow(local: Floats, normals: Floats, thickness: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def too_narrow(local: Floats, normals: Floats, thickness: float) -> Bools:
     """Tell which polygons (g, k, 3) MuJoCo cannot hold as they are, (g,)."""
     # A convex polygon is narrowest square to one of its edges.
     out = np.empty(len(local), dtype=np.bool_)
@@ -250,7 +247,8 @@ def _widened(local: Floats, normal: Floats, thickness: float) -> Floats:
     return (middle + signs * half) @ axes
 
 
-def _frozen(vertices: Floats, center: Floats, polygon: Polygon | None = None) -> ConvexPiece:
+def frozen_piece(vertices: Floats, center: Floats, polygon: Polygon | None = None) -> ConvexPiece:
+    """Make a piece of arrays of its own, which become read-only."""
     vertices.setflags(write=False)
     center.setflags(write=False)
     return ConvexPiece(vertices, center, polygon)

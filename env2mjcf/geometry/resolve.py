@@ -70,7 +70,7 @@ def find_all(
     for extra in options.mesh_dirs:
         if not Path(extra).is_dir():
             hint = "check the path: it is relative to the current directory"
-            log.warn("GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is no folder", hint=hint)
+            log.warn("GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is not a folder", hint=hint)
     finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
     found: dict[str, Path] = {}
     problems: dict[str, Problem] = {}
@@ -105,20 +105,19 @@ class _Finder:
             return Problem("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
         slashed = name.replace("\\", "/")
         found = self._first_file(name)
-        if found is None and slashed != name:
-            found = self._first_file(slashed)
-            if found is not None:
-                message = f"the backslashes of {name!r} are read as slashes"
-                self._log.warn("GEO206", name, message, hint=f"write {slashed}", span=span)
+        if found is None and slashed != name and (found := self._first_file(slashed)):
+            message = f"the backslashes of {name!r} are read as slashes"
+            self._log.warn("GEO206", name, message, hint=f"write {slashed}", span=span)
+        if found is None and (found := self._any_case(slashed)):
+            message = f"there is no {name!r}; {str(found)!r}, which differs in case, is read"
+            self._log.warn("GEO205", name, message, hint="write the name as the file's", span=span)
         if found is None:
-            found = self._any_case(slashed)
-            if found is not None:
-                message = f"there is no {name!r}; {str(found)!r}, which differs in case, is read"
-                self._log.warn("GEO205", name, message, hint="write the name as the file's", span=span)
-        if found is None:
-            return self._missing(name, span)
+            return self._missing(name, slashed, span)
         if not self._inside(found):
-            return self._outside(found, span)
+            message = f"{str(found)!r} lies outside the scene's folder and mesh_dirs"
+            folder = str(found.parent)
+            hint = f"if you trust the scene: allow_outside=True (--allow-outside), or mesh_dirs=[{folder!r}]"
+            return Problem("GEO202", str(found), message, hint, span, found)
         if not os.access(found, os.R_OK):
             return Problem("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span, found)
         return found
@@ -165,18 +164,7 @@ class _Finder:
         real = os.path.realpath(path)
         return any(real == f or real.startswith(os.path.join(f, "")) for f in self._real_folders)
 
-    def _outside(self, found: Path, span: Span | None) -> Problem:
-        return Problem(
-            "GEO202",
-            str(found),
-            f"{str(found)!r} lies outside the scene's folder and mesh_dirs",
-            f"if you trust the scene: allow_outside=True (--allow-outside), or mesh_dirs=[{str(found.parent)!r}]",
-            span,
-            found,
-        )
-
-    def _missing(self, name: str, span: Span | None) -> Problem:
-        slashed = name.replace("\\", "/")
+    def _missing(self, name: str, slashed: str, span: Span | None) -> Problem:
         candidates = self._candidates(slashed)
         for candidate in candidates:
             if os.path.lexists(candidate) and self._inside(candidate):

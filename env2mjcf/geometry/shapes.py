@@ -20,7 +20,7 @@ from .mesh import Mesh
 from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
-from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, face_areas
+from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
 
 __all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 
@@ -88,38 +88,30 @@ def collision_shape(
         raise ValueError(f"collision={strategy!r} is not one of {', '.join(map(repr, _STRATEGIES))}")
     if analysis.dimension < 2:
         refuse_without_area(analysis, log, subject or mesh.name, span)
+    subject = subject or mesh.name
     build = partial(_STRATEGIES[strategy], mesh, analysis, thickness, work or Work())
     try:
         if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
-            shape = cache.remember(
-                ("shape", mesh.digest, strategy, thickness),
-                build,
-                kinds=(CollisionShape, ConvexPiece, Polygon),
-                known={"mesh": mesh, "analysis": analysis},
-                log=log,
-                subject=subject or mesh.name,
-            )
+            what, known = ("shape", mesh.digest, strategy, thickness), {"mesh": mesh, "analysis": analysis}
+            kinds = CollisionShape, ConvexPiece, Polygon
+            shape = cache.remember(what, build, kinds=kinds, known=known, log=log, subject=subject)
         else:
             shape = build()
     except DecompositionError as error:
         hint = "collision='auto' collides the true shape, without CoACD"
-        log.fail("GEO262", subject or mesh.name, f"{mesh.name}: {error}", hint=hint, span=span)
+        log.fail("GEO262", subject, f"{mesh.name}: {error}", hint=hint, span=span)
     if strategy == "hull" and not analysis.convex:
         hint = "collision='auto' collides the true shape"
-        log.info("GEO240", subject or mesh.name, shape.note, hint=hint, span=span)
+        log.info("GEO240", subject, shape.note, hint=hint, span=span)
     if strategy == "solid" and not analysis.solid:
         hint = "close the mesh, or give it a wall thickness, if its inside matters"
-        log.info("GEO243", subject or mesh.name, shape.note, hint=hint, span=span)
+        log.info("GEO243", subject, shape.note, hint=hint, span=span)
     if shape.omitted_area:
-        _report_omission(shape, log, subject or mesh.name, span)
+        message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
+        hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
+        report = log.warn if shape.pieces else log.fail
+        report("GEO241", subject, message, hint=hint, span=span)
     return shape
-
-
-def _report_omission(shape: CollisionShape, log: DiagnosticLog, subject: str, span: Span | None) -> None:
-    message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
-    hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
-    report = log.warn if shape.pieces else log.fail
-    report("GEO241", subject, message, hint=hint, span=span)
 
 
 def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
@@ -145,15 +137,9 @@ def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Co
     polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
     made = {id(piece.polygon) for piece in pieces}
-    return CollisionShape(
-        mesh=mesh,
-        strategy="surface",
-        pieces=pieces,
-        needs_containment=False,
-        analysis=analysis,
-        note=f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}",
-        omitted_area=_area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made]),
-    )
+    omitted = _area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made])
+    note = f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
+    return CollisionShape(mesh, "surface", pieces, False, analysis, note, omitted)
 
 
 def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float:
@@ -183,15 +169,9 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         return CollisionShape(mesh, "hull", hulls, False, analysis, _hulled(hulls))
     lining = shells(analysis, rest, thickness, work)
     note = _shell_note(lining, analysis.component_volumes[~whole].sum())
-    return CollisionShape(
-        mesh=mesh,
-        strategy="solid",
-        pieces=hulls + lining.pieces,
-        needs_containment=True,
-        analysis=analysis,
-        note=f"{_hulled(hulls)}, {note}" if hulls else note,
-        omitted_area=_area(analysis, rest, lining.missing),
-    )
+    note = f"{_hulled(hulls)}, {note}" if hulls else note
+    omitted = _area(analysis, rest, lining.missing)
+    return CollisionShape(mesh, "solid", hulls + lining.pieces, True, analysis, note, omitted)
 
 
 def _shell_note(lining: Shells, volume: float) -> str:
@@ -212,9 +192,8 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         return _surface(mesh, analysis, thickness, work)
     parts = approximate_parts(analysis.vertices, analysis.faces)
     pieces = tuple(hull_piece(part, thickness) for part in parts)
-    return CollisionShape(
-        mesh, "coacd", pieces, False, analysis, f"{_count(len(pieces), 'convex part')} by CoACD, approximately"
-    )
+    note = f"{_count(len(pieces), 'convex part')} by CoACD, approximately"
+    return CollisionShape(mesh, "coacd", pieces, False, analysis, note)
 
 
 def _convex_solids(analysis: Analysis, work: Work) -> Bools:
@@ -225,9 +204,7 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     out = np.zeros(analysis.components, dtype=np.bool_)
     if not analysis.solid:
         return out
-    order = np.argsort(analysis.component, kind="stable")
-    groups = np.split(analysis.faces[order], np.cumsum(np.bincount(analysis.component))[:-1])
-    parts = [np.unique(g, return_inverse=True) for g in groups]
+    parts = [np.unique(g, return_inverse=True) for g in by_component(analysis.faces, analysis.component)]
     points = [analysis.vertices[used] for used, _ in parts]
     low, high = (np.array([f(p, axis=0) for p in points]) for f in (np.min, np.max))
     size = np.linalg.norm(high - low, axis=1)
@@ -235,15 +212,10 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     cavities = volumes <= RELATIVE_TOLERANCE * size**3
     work.spend(int(cavities.sum()) * int((~cavities).sum()))
     for c in np.flatnonzero(~cavities):
-        if not _apart(low[c], high[c], low[cavities], high[cavities]):
-            continue
-        out[c] = is_convex(points[c], parts[c][1].reshape(-1, 3).astype(np.int64), RELATIVE_TOLERANCE * size[c])
+        if ((low[cavities] > high[c]) | (high[cavities] < low[c])).any(axis=1).all():
+            faces = parts[c][1].reshape(-1, 3).astype(np.int64)
+            out[c] = is_convex(points[c], faces, RELATIVE_TOLERANCE * size[c])
     return out
-
-
-def _apart(low: Floats, high: Floats, lows: Floats, highs: Floats) -> bool:
-    """Tell whether a bounding box meets none of the others."""
-    return bool(((lows > high) | (highs < low)).any(axis=1).all())
 
 
 def _count(n: int, noun: str) -> str:

@@ -7,7 +7,6 @@ import os
 import platform
 import re
 import struct
-import sys
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -20,10 +19,11 @@ from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from platformdirs import user_cache_path
 
 from ..diagnostics import DiagnosticLog
 from ..system.files import NoRegularFileError, open_regular, replaced
-from .packing import pack, unpack
+from .serialization import pack, unpack
 
 T = TypeVar("T")
 
@@ -42,10 +42,8 @@ _STAGED = re.compile(r"\.[0-9a-f]{64}-[0-9a-f]{16}\.npz")
 _ALTERED = "its content is not what was written"
 _LIBRARIES = ("numpy", "mujoco", "coacd")
 # What stands in an entry's place without being a file, and all that numpy raises on files cut short or altered.
-_DAMAGE = (
-    NoRegularFileError, zipfile.BadZipFile, struct.error, EOFError, ValueError, TypeError, LookupError,
-    ArithmeticError, MemoryError, RuntimeError,
-)  # fmt: skip
+_DAMAGED_FILES = (NoRegularFileError, zipfile.BadZipFile, struct.error, EOFError)
+_DAMAGE = (*_DAMAGED_FILES, ValueError, TypeError, LookupError, ArithmeticError, MemoryError, RuntimeError)
 
 
 def default_folder() -> Path | None:
@@ -53,19 +51,10 @@ def default_folder() -> Path | None:
     named = os.environ.get(FOLDER_VARIABLE)
     if named:
         return Path(os.path.abspath(named))
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or ""
-        # The XDG specification has relative paths ignored.
-        base = base if os.path.isabs(base) else home / ".cache"
-    return Path(base) / "env2mjcf"
+    with suppress(RuntimeError):
+        folder = user_cache_path("env2mjcf", appauthor=False, opinion=False)
+        return folder if folder.is_absolute() else None
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +134,8 @@ class GeometryCache:
 
     def state(self) -> CacheState:
         """Say what the folder holds."""
-        used = sorted(u for _, u, _ in self._entries())
-        held = sum(size for _, _, size in self._entries())
+        entries = self._files()
+        used, held = sorted(u for _, u, _ in entries), sum(size for _, _, size in entries)
         return CacheState(self.folder, len(used), held, self.limit, *((used[0], used[-1]) if used else (None, None)))
 
     def clear(self) -> int:
@@ -155,10 +144,8 @@ class GeometryCache:
         Raises:
             OSError: An entry may not be removed.
         """
-        entries = self._entries()
-        for path, _, _ in entries:
-            path.unlink(missing_ok=True)
-        for path, _ in self._staged():
+        entries = self._files()
+        for path, _, _ in entries + self._files(_STAGED):
             path.unlink(missing_ok=True)
         return len(entries)
 
@@ -191,15 +178,15 @@ class GeometryCache:
     def _make_room(self, new: Path, size: int) -> None:
         """Remove what was not used for longest, if there is too much; the folder is only listed then, and once."""
         if self._held is None:
-            self._held = sum(s for _, _, s in self._entries())
-            for path, written in self._staged():
+            self._held = sum(s for _, _, s in self._files())
+            for path, written, _ in self._files(_STAGED):
                 if time.time() - written > _STALE_SECONDS:
                     path.unlink(missing_ok=True)
         else:
             self._held += size
         if self._held <= self.limit:
             return
-        entries = sorted(self._entries(), key=lambda e: (e[1], e[0].name))
+        entries = sorted(self._files(), key=lambda e: (e[1], e[0].name))
         self._held = sum(s for _, _, s in entries)
         for path, _, freed in entries:
             if self._held <= _LOWERED * self.limit:
@@ -208,15 +195,9 @@ class GeometryCache:
                 path.unlink(missing_ok=True)
                 self._held -= freed
 
-    def _entries(self) -> list[tuple[Path, float, int]]:
-        """Return path, time of last use and size of every entry."""
-        return [(path, s.st_mtime, s.st_size) for path, s in self._files(_ENTRY)]
-
-    def _staged(self) -> list[tuple[Path, float]]:
-        return [(path, s.st_mtime) for path, s in self._files(_STAGED)]
-
-    def _files(self, pattern: re.Pattern[str]) -> list[tuple[Path, os.stat_result]]:
-        found: list[tuple[Path, os.stat_result]] = []
+    def _files(self, pattern: re.Pattern[str] = _ENTRY) -> list[tuple[Path, float, int]]:
+        """Return path, time of last use and size of the entries, or of what writers left behind."""
+        found: list[tuple[Path, float, int]] = []
         if self.folder is None:
             return found
         with suppress(FileNotFoundError, NotADirectoryError), os.scandir(self.folder) as listing:
@@ -224,7 +205,7 @@ class GeometryCache:
                 # Another process may have removed it since.
                 with suppress(FileNotFoundError):
                     if pattern.fullmatch(item.name) and item.is_file(follow_symlinks=False):
-                        found.append((Path(item.path), item.stat()))
+                        found.append((Path(item.path), item.stat().st_mtime, item.stat().st_size))
         return found
 
 

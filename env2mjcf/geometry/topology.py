@@ -1,7 +1,4 @@
-"""Which vertices are one point, which faces share an edge, which faces hang together.
-
-MERGED: Weld a triangle list, and drop what is no triangle or is there twice.
-"""
+"""How the triangles of a mesh hang together: welded points, shared edges, components, and the triangles that count."""
 
 from __future__ import annotations
 
@@ -37,6 +34,23 @@ class Edges:
     faces: Ints
     balance: Ints
 
+    def neighbours(self) -> tuple[Ints, Ints, Ints]:
+        """Return the corners of faces that share an edge, one pair after the other, and that edge, (p,) each."""
+        corner = np.argsort(self.of_corner.ravel(), kind="stable")
+        edge = self.of_corner.ravel()[corner]
+        pair = np.flatnonzero(edge[1:] == edge[:-1])
+        return corner[pair], corner[pair + 1], edge[pair]
+
+    def turned(self, chosen: Bools) -> Edges:
+        """Return the edges after some faces, a mask (m,), are turned round to `faces[:, ::-1]`."""
+        of_corner = np.where(chosen[:, None], self.of_corner[:, (1, 0, 2)], self.of_corner)
+        forward = np.where(chosen[:, None], ~self.forward[:, (1, 0, 2)], self.forward)
+        return Edges(self.ends, of_corner, forward, self.faces, _balance(of_corner, forward, self.faces))
+
+
+def _balance(of_corner: Ints, forward: Bools, count: Ints) -> Ints:
+    return 2 * np.bincount(of_corner[forward], minlength=len(count)).astype(np.int64) - count
+
 
 def edges(faces: Ints) -> Edges:
     """Tabulate the edges of `faces`, (m, 3) vertex indices."""
@@ -47,17 +61,20 @@ def edges(faces: Ints) -> Edges:
     keys, of_corner = np.unique(low * span + high, return_inverse=True)
     of_corner = of_corner.reshape(-1, 3).astype(np.int64)
     count = np.bincount(of_corner.ravel(), minlength=len(keys)).astype(np.int64)
-    ahead = np.bincount(of_corner[forward], minlength=len(keys)).astype(np.int64)
-    return Edges(np.stack(np.divmod(keys, span), axis=1), of_corner, forward, count, 2 * ahead - count)
+    ends = np.stack(np.divmod(keys, span), axis=1)
+    return Edges(ends, of_corner, forward, count, _balance(of_corner, forward, count))
 
 
 def face_components(table: Edges) -> Ints:
     """Label faces that are linked by shared edges, (m,) from 0 in order of each component's first face."""
-    count = len(table.of_corner)
-    order = np.argsort(table.of_corner.ravel(), kind="stable")
-    edge, face = table.of_corner.ravel()[order], order // 3
-    linked = edge[1:] == edge[:-1]
-    return connected(count, face[:-1][linked], face[1:][linked])
+    here, there, _ = table.neighbours()
+    return connected(len(table.of_corner), here // 3, there // 3)
+
+
+def by_component(faces: Ints, component: Ints) -> list[Ints]:
+    """Return the faces of each component."""
+    order = np.argsort(component, kind="stable")
+    return np.split(faces[order], np.cumsum(np.bincount(component))[:-1])
 
 
 def connected(count: int, a: Ints, b: Ints) -> Ints:
@@ -116,10 +133,14 @@ def _near(points: Floats, tolerance: float) -> Ints:
     return connected(len(points), np.concatenate([x[0] for x in links]), np.concatenate([x[1] for x in links]))
 
 
+def area_vectors(corners: Floats) -> Floats:
+    """Return the normals of triangles (m, 3, 3), each as long as twice the triangle's area, (m, 3)."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def face_areas(vertices: Floats, faces: Ints) -> Floats:
     """Return the area of each face, (m,)."""
-    corners = vertices[faces]
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    return np.linalg.norm(area_vectors(vertices[faces]), axis=1) / 2
 
 
 def face_volumes(vertices: Floats, faces: Ints) -> Floats:
@@ -135,8 +156,9 @@ class Cleaned:
     Attributes:
         faces: (k, 3) indices into the given points, welded ones replaced by the first of their kind.
         source: (k,) rows of the given faces.
-        edges: Of the faces that decide whether the surface is closed: `faces`, and perhaps some of no height.
-        closed: Each of those edges has an even number of faces, and the points are not flat.
+        edges: Of `faces`.
+        deciding: Edges of the faces that decide whether the surface is closed: `faces`, and perhaps some of no height.
+        closed: Each of the deciding edges has an even number of faces, and the points are not flat.
         degenerate: Number of faces of no height.
         duplicates: Number of copies that were dropped.
     """
@@ -144,6 +166,7 @@ class Cleaned:
     faces: Ints
     source: Ints
     edges: Edges
+    deciding: Edges
     closed: bool
     degenerate: int
     duplicates: int
@@ -162,10 +185,11 @@ def cleaned(points: Floats, faces: Ints, tolerance: float, dimension: int) -> Cl
     whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     high = _heights(points, faces) > tolerance
     one, both = _without_copies(faces)
-    keep, table, closed = _choose(points, faces, (one & whole, both & whole), high, dimension)
+    keep, deciding, closed = _choose(points, faces, (one & whole, both & whole), high, dimension)
     source = np.flatnonzero(keep & high)
+    table = deciding if len(deciding.of_corner) == len(source) else edges(faces[source])
     degenerate = int((~whole | (one & ~high)).sum())
-    return Cleaned(faces[source], source, table, closed, degenerate, int((whole & ~keep).sum()))
+    return Cleaned(faces[source], source, table, deciding, closed, degenerate, int((whole & ~keep).sum()))
 
 
 def _heights(points: Floats, faces: Ints) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +94,7 @@ class Search:
                 job, a, b, low = job[kept], a[kept], b[kept], low[kept]
             if not (trees.children[a].any() or trees.children[b].any()):
                 break
-            job, a, b = opened(trees, job, a, b)
+            job, a, b = _opened(trees, job, a, b)
         self._exactly(job, trees.triangle[a], trees.triangle[b], low)
         touching = np.concatenate(self._touching) if self._touching else np.zeros((0, 3), dtype=np.int64)
         job, a, b = self._where.T
@@ -105,18 +106,11 @@ class Search:
         Raises:
             TooMuchWorkError: More nodes must be looked at than `work` has left.
         """
-        work = work or Work()
-        trees, jobs = self._trees, self._jobs
-        job = np.arange(len(jobs.a), dtype=np.int64)
-        a, b = trees.roots[jobs.a], trees.roots[jobs.b]
-        while True:
-            blocks = (slice(i, i + _PAIRS) for i in range(0, max(1, len(job)), _PAIRS))
-            kept = np.concatenate([self._bounds(job[i], a[i], b[i])[0] <= reach for i in blocks])
-            job, a, b = job[kept], a[kept], b[kept]
-            if not (trees.children[a].any() or trees.children[b].any()):
-                return np.stack([job, trees.triangle[a], trees.triangle[b]], axis=1)
-            work.spend(COSTLY * int((np.maximum(trees.children[a], 1) * np.maximum(trees.children[b], 1)).sum()))
-            job, a, b = opened(trees, job, a, b)
+
+        def near(job: Ints, a: Ints, b: Ints) -> Bools:
+            return self._bounds(job, a, b)[0] <= reach
+
+        return np.stack(leaves(self._trees, self._jobs, near, _PAIRS, work), axis=1)
 
     def _bounds(self, job: Ints, a: Ints, b: Ints) -> tuple[Floats, Floats]:
         """Return lower and upper bounds of the distance of nodes.
@@ -142,7 +136,7 @@ class Search:
     def _promising(self, job: Ints, low: Floats) -> Ints:
         """Return the rows of the least bounds of each group."""
         order = np.argsort(low, kind="stable")
-        return order[_turn(self._jobs.group[job[order]]) < _PROBES]
+        return order[_rank(self._jobs.group[job[order]]) < _PROBES]
 
     def _exactly(self, job: Ints, a: Ints, b: Ints, low: Floats) -> None:
         """Take the distance of pairs of triangles, the most promising first, until the rest cannot matter."""
@@ -172,7 +166,33 @@ class Search:
         self._bound = np.minimum(self._bound, self._distance)
 
 
-def opened(trees: Forest, job: Ints, a: Ints, b: Ints) -> tuple[Ints, Ints, Ints]:
+def leaves(
+    trees: Forest, jobs: Jobs, meet: Callable[[Ints, Ints, Ints], Bools], block: int, work: Work | None = None
+) -> tuple[Ints, Ints, Ints]:
+    """Walk down all pairs of trees at once, and return job and triangles, (k,) each, of the leaves that meet.
+
+    Args:
+        trees: The meshes.
+        jobs: What to compare.
+        meet: Tells of jobs and pairs of nodes which may have triangles that matter.
+        block: How many it is given at a time.
+        work: What may be done; None sets no bound.
+    """
+    job = np.arange(len(jobs.a), dtype=np.int64)
+    a, b = trees.roots[jobs.a], trees.roots[jobs.b]
+    while True:
+        parts = [meet(job[i : i + block], a[i : i + block], b[i : i + block]) for i in range(0, len(job), block)]
+        kept = np.concatenate([np.zeros(0, dtype=np.bool_), *parts])
+        job, a, b = job[kept], a[kept], b[kept]
+        many_a, many_b = trees.children[a], trees.children[b]
+        if not (many_a.any() or many_b.any()):
+            return job, trees.triangle[a], trees.triangle[b]
+        if work is not None:
+            work.spend(COSTLY * int((np.maximum(many_a, 1) * np.maximum(many_b, 1)).sum()))
+        job, a, b = _opened(trees, job, a, b)
+
+
+def _opened(trees: Forest, job: Ints, a: Ints, b: Ints) -> tuple[Ints, Ints, Ints]:
     """Replace pairs of nodes by the pairs of their children; a leaf stands for itself."""
     many_a, many_b = np.maximum(trees.children[a], 1), np.maximum(trees.children[b], 1)
     count = many_a * many_b
@@ -184,7 +204,7 @@ def opened(trees: Forest, job: Ints, a: Ints, b: Ints) -> tuple[Ints, Ints, Ints
     return job[of], start_a[of] + step_a, start_b[of] + step_b
 
 
-def _turn(values: Ints) -> Ints:
+def _rank(values: Ints) -> Ints:
     """Return for each value how many equal ones stand before it."""
     order = np.argsort(values, kind="stable")
     runs = values[order]

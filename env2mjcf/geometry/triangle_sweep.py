@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .topology import Bools, Floats, Ints
-from .triangle_search import Jobs, opened
+from .triangle_search import Jobs, leaves
 from .triangle_tree import Forest
 
+# Pairs of nodes or triangles looked at at once: for each push there is all that two meshes have.
 _BLOCK = 20_000
 # Parameters this far outside of an edge or a triangle still count: what meets edge on must not slip through.
 _SLACK = 1e-9
@@ -25,7 +26,11 @@ def escapes(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> Fl
         directions: (j, 3) unit vectors in the frame of a.
         window: (j,) greatest way.
     """
-    job, a, b = _swept(trees, jobs, directions, window)
+
+    def meet(job: Ints, a: Ints, b: Ints) -> Bools:
+        return _boxes_meet(trees, jobs, directions, window, job, a, b)
+
+    job, a, b = leaves(trees, jobs, meet, _BLOCK)
     starts, ends = np.empty(len(job)), np.empty(len(job))
     for i in range(0, len(job), _BLOCK):
         part = slice(i, i + _BLOCK)
@@ -43,21 +48,6 @@ def escapes(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> Fl
         gap = np.append(starts[mine], np.inf) > covered
         out[k] = covered[int(np.argmax(gap))]
     return np.where(out <= window, out, np.inf)
-
-
-def _swept(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> tuple[Ints, Ints, Ints]:
-    """Return the job and the triangles of all pairs whose boxes meet on the way."""
-    job = np.arange(len(jobs.a), dtype=np.int64)
-    a, b = trees.roots[jobs.a], trees.roots[jobs.b]
-    while True:
-        # For each push, all that two meshes have: too much to be looked at at once.
-        blocks = [slice(i, i + _BLOCK) for i in range(0, len(job), _BLOCK)]
-        parts = [_boxes_meet(trees, jobs, directions, window, job[s], a[s], b[s]) for s in blocks]
-        kept = np.concatenate([np.zeros(0, dtype=np.bool_), *parts])
-        job, a, b = job[kept], a[kept], b[kept]
-        if not (trees.children[a].any() or trees.children[b].any()):
-            return job, trees.triangle[a], trees.triangle[b]
-        job, a, b = opened(trees, job, a, b)
 
 
 def _boxes_meet(trees: Forest, jobs: Jobs, directions: Floats, window: Floats, job: Ints, a: Ints, b: Ints) -> Bools:

@@ -46,24 +46,17 @@ def forest(meshes: Sequence[Floats]) -> Forest:
     trees = [_tree(triangles) for triangles in meshes]
     nodes = np.cumsum([0, *(len(t.first) for t in trees)])
     faces = np.cumsum([0, *(len(t.triangles) for t in trees)])
-    empty = _tree(np.zeros((1, 3, 3)))
-
-    def joined(arrays: list[Floats], like: Floats) -> Floats:
-        return np.concatenate(arrays) if arrays else like[:0]
-
-    def shifted(arrays: list[Ints], by: Ints) -> Ints:
-        return np.concatenate([a + b for a, b in zip(arrays, by, strict=False)] or [np.zeros(0, dtype=np.int64)])
-
+    vectors, none = np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
     return Forest(
-        triangles=joined([t.triangles for t in trees], empty.triangles),
+        triangles=np.concatenate([np.zeros((0, 3, 3)), *(t.triangles for t in trees)]),
         roots=nodes[:-1].astype(np.int64),
-        center=joined([t.center for t in trees], empty.center),
-        frame=joined([t.frame for t in trees], empty.frame),
-        half=joined([t.half for t in trees], empty.half),
-        point=joined([t.point for t in trees], empty.point),
-        first=shifted([t.first for t in trees], nodes),
-        children=shifted([t.children for t in trees], np.zeros(len(trees), dtype=np.int64)),
-        triangle=shifted([t.triangle for t in trees], faces),
+        center=np.concatenate([vectors, *(t.center for t in trees)]),
+        frame=np.concatenate([np.zeros((0, 3, 3)), *(t.frame for t in trees)]),
+        half=np.concatenate([vectors, *(t.half for t in trees)]),
+        point=np.concatenate([vectors, *(t.point for t in trees)]),
+        first=np.concatenate([none, *(t.first + n for t, n in zip(trees, nodes, strict=False))]),
+        children=np.concatenate([none, *(t.children for t in trees)]),
+        triangle=np.concatenate([none, *(t.triangle + n for t, n in zip(trees, faces, strict=False))]),
     )
 
 
@@ -124,14 +117,9 @@ def _boxes(triangles: Floats, start: Ints, size: Ints) -> tuple[Floats, Floats, 
         center, half = mean + (axes @ ((low + high) / 2)[..., None])[..., 0], (high - low) / 2
         if best is None:
             best = center, axes, half
-            continue
-        better = _surface(half) < _surface(best[2])
-        chosen = better[:, None]
-        best = (
-            np.where(chosen, center, best[0]),
-            np.where(chosen[..., None], axes, best[1]),
-            np.where(chosen, half, best[2]),
-        )
+        better = (_surface(half) < _surface(best[2]))[:, None]
+        center, half = np.where(better, center, best[0]), np.where(better, half, best[2])
+        best = center, np.where(better[..., None], axes, best[1]), half
     assert best is not None
     return best
 

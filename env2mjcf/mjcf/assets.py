@@ -95,7 +95,7 @@ def _visual_file(mesh: Mesh) -> tuple[bytes, str]:
 def _drawable(mesh: Mesh) -> tuple[Array, np.ndarray]:
     """MuJoCo wants four vertices: a lone triangle is drawn as three about its centre."""
     faces = mesh.faces
-    if len(np.unique(mesh.vertices[np.unique(faces)], axis=0)) >= 4:
+    if len(np.unique(mesh.used_vertices, axis=0)) >= 4:
         return mesh.vertices, faces
     centers = mesh.vertices[faces].mean(axis=1)
     n = len(mesh.vertices) + np.arange(len(faces))

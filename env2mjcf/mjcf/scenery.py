@@ -24,7 +24,7 @@ def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
     A seventieth of the time in which that link falls by its own thickness, between 0.1 and 2 ms: chains of thin links
     spin fast, and gained energy at twice that step.
     """
-    thickness = min((_thickness(p) for r in assembly.robots for p in r.links), default=1.0)
+    thickness = min((_thickness(p) for p in assembly.links), default=1.0)
     g = math.hypot(*gravity) or STANDARD_GRAVITY
     step = math.sqrt(2 * thickness / g) / 70
     return min(max(float(f"{step:.0e}"), 1e-4), 2e-3)
@@ -32,7 +32,7 @@ def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
 
 def _thickness(part: Part) -> float:
     """Return the least side of a mesh's box; sheets count as a twentieth of their diagonal."""
-    used = part.mesh.vertices[np.unique(part.mesh.faces)]
+    used = part.mesh.used_vertices
     return max(float(np.min(np.ptp(used, axis=0))), part.mesh.diagonal / 20)
 
 

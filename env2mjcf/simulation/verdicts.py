@@ -44,7 +44,7 @@ class Verdicts:
         self._scene, self._q, self.labels = scene, q, labels
         self._placed = np.zeros(len(q), dtype=bool) if fits is None or poses is None else ~fits
         assembly = scene.compiled.assembly
-        self._boundary = BoundaryTest(assembly.environment.boundary, [p for r in assembly.robots for p in r.links])
+        self._boundary = BoundaryTest(assembly.environment.boundary, assembly.links)
         self.in_limits = scene.space.within_limits(q)
         self.in_collision = np.asarray(scene.in_collision(q, progress=True))
         self._poses = scene.link_poses(q)

@@ -218,7 +218,7 @@ def _in_view(shot: Shot) -> Array:
     rows = _rows(shot)
     poses = shot.scene.link_poses(rows)
     shape = _vertices if len(rows) <= _FEW else _box
-    points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(p for r in assembly.robots for p in r.links)]
+    points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(assembly.links)]
     points += [np.asarray(mark.points, dtype=np.float64).reshape(-1, 3) for mark in shot.marks]
     bodies = np.concatenate([np.zeros((0, 3)), *points])
     if not len(bodies):
@@ -236,7 +236,7 @@ def _rows(shot: Shot) -> Array:
 
 def _vertices(part: Part) -> Array:
     """Return the vertices that a body's triangles use, (n, 3), in its own frame."""
-    return part.mesh.vertices[np.unique(part.mesh.faces)]
+    return part.mesh.used_vertices
 
 
 def _box(part: Part) -> Array:

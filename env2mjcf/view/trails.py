@@ -27,7 +27,7 @@ def reference_points(scene: Scene, q: ArrayLike) -> Array:
     first = 0
     for robot in scene.compiled.assembly.robots:
         i = _reference_link(robot)
-        used = robot.links[i].mesh.vertices[np.unique(robot.links[i].mesh.faces)]
+        used = robot.links[i].mesh.used_vertices
         middle = (used.min(axis=0) + used.max(axis=0)) / 2
         own = poses[:, first + i]
         points.append(own[:, :3, :3] @ middle + own[:, :3, 3])
@@ -66,9 +66,9 @@ def lengths(scene: Scene, rows: Array) -> Array:
     """
     moved = np.zeros(max(len(rows) - 1, 0))
     poses = scene.link_poses(rows)
-    links = [p for r in scene.compiled.assembly.robots for p in r.links]
+    links = scene.compiled.assembly.links
     for i, part in enumerate(links):
-        used = part.mesh.vertices[np.unique(part.mesh.faces)]
+        used = part.mesh.used_vertices
         low, high = used.min(axis=0), used.max(axis=0)
         for corner in np.array([low, high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]:
             way = poses[:, i, :3, :3] @ corner + poses[:, i, :3, 3]

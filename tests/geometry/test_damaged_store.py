@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from env2mjcf.diagnostics import DiagnosticLog
-from env2mjcf.geometry.packing import pack
+from env2mjcf.geometry.serialization import pack
 from env2mjcf.geometry.store import GeometryCache, entry_key
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pipes, limits, permissions")
@@ -158,7 +158,7 @@ def _entries():
     return collisions
 collisions = _entries()
 if __name__ != "__main__":
-    from env2mjcf.contact.exact.compiled import call
+    from env2mjcf.contact.exact.engine import call
     out = np.zeros(3, dtype=np.bool_)
     call(collisions, np.array([1.0, -1.0, 2.0]), out)
     print(out.tolist(), sum(collisions.stats.cache_hits.values()))

@@ -11,8 +11,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import platformdirs
+import platformdirs.windows
 import pytest
 from meshes import channel, grid
+from platformdirs.macos import MacOS
+from platformdirs.unix import Unix
+from platformdirs.windows import Windows
 from scenes import MODELS
 
 import env2mjcf
@@ -20,7 +25,7 @@ from env2mjcf.cli.main import main
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry import shapes
 from env2mjcf.geometry.analysis import analyse
-from env2mjcf.geometry.packing import pack, unpack
+from env2mjcf.geometry.serialization import pack, unpack
 from env2mjcf.geometry.store import GeometryCache, default_folder, entry_key
 
 BUG_TRAP = MODELS / "bug-trap" / "bug-trap.env"
@@ -216,18 +221,20 @@ class TestFolder:
     def _no_variables(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         for name in ("ENV2MJCF_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
             monkeypatch.delenv(name, raising=False)
-        monkeypatch.setattr(Path, "home", lambda: tmp_path)
+        monkeypatch.setenv("HOME", str(tmp_path))
+        local = str(tmp_path / "AppData" / "Local")
+        monkeypatch.setattr(platformdirs.windows, "get_win_folder", {"CSIDL_LOCAL_APPDATA": local}.__getitem__)
 
     @pytest.mark.parametrize(
         ("system", "place"),
-        [("linux", ".cache/env2mjcf"), ("darwin", "Library/Caches/env2mjcf"), ("win32", "AppData/Local/env2mjcf")],
+        [(Unix, ".cache/env2mjcf"), (MacOS, "Library/Caches/env2mjcf"), (Windows, "AppData/Local/env2mjcf")],
     )
     def test_is_the_platforms(self, system, place, tmp_path, monkeypatch):
-        monkeypatch.setattr(sys, "platform", system)
+        monkeypatch.setattr(platformdirs, "PlatformDirs", system)
         assert default_folder() == tmp_path / place
 
     def test_follows_xdg_but_not_to_a_relative_path(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(sys, "platform", "linux")
+        monkeypatch.setattr(platformdirs, "PlatformDirs", Unix)
         monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
         assert default_folder() == Path("/somewhere/env2mjcf")
         monkeypatch.setenv("XDG_CACHE_HOME", "here")
@@ -238,10 +245,9 @@ class TestFolder:
         assert default_folder() == tmp_path / "mine"
 
     def test_may_be_none(self, monkeypatch):
-        def nobody() -> Path:
-            raise RuntimeError("no home")
-
-        monkeypatch.setattr(Path, "home", nobody)
+        monkeypatch.setattr(platformdirs, "PlatformDirs", Unix)
+        monkeypatch.delenv("HOME")
+        monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)  # as for a user that the system does not know
         assert default_folder() is None
 
 

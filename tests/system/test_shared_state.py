@@ -52,7 +52,7 @@ CHANGING = {
 def modules() -> Iterator[Any]:
     for found in pkgutil.walk_packages(env2mjcf.__path__, "env2mjcf."):
         # Run as scripts, not imported.
-        if not found.name.endswith(("__main__", ".worker", "decompose_worker")):
+        if not found.name.endswith(("__main__", ".worker")):
             yield importlib.import_module(found.name)
 
 

@@ -1,6 +1,6 @@
 """The exact engine: verdicts, distances and edges on triangles, by compiled code without Python's lock.
 
-MERGED: The compiled functions of the exact engine: imported late, compiled anew where the disk is damaged, safe at forks.
+The compiled functions are imported late, compiled anew where what is kept of them is damaged, and safe at forks.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...kinematics.transforms import Array
 from ...pairs import Pair
 from ..surfaces import Surfaces
 from .instructions import program
-from .tables import Table, packed
+from .tables import WIDTHS, Tables, packed
 
 Bools = NDArray[np.bool_]
 
@@ -121,12 +121,10 @@ def compile_all() -> float:
     What is compiled is the same for every scene: tables of any kind will do, such as empty ones.
     """
     start = time.perf_counter()
-    nothing = {table: np.zeros(0) for table in Table} | {Table.COUNTS: np.zeros(3)}
-    kernels, tables = entries(), packed(nothing)
+    kernels, tables = entries(), packed(Tables(*(np.zeros(0) for _ in WIDTHS))._replace(counts=np.zeros(3)))
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
-    call(kernels.collisions, *tables, rows, answers)
-    call(kernels.validities, *tables, rows, answers)
-    call(kernels.distances, *tables, rows, floats)
+    for kernel, out in ((kernels.collisions, answers), (kernels.validities, answers), (kernels.distances, floats)):
+        call(kernel, *tables, rows, out)
     call(kernels.edges_collide, *tables, rows, rows, np.zeros(0, dtype=np.int64), answers)
     call(kernels.edges_are_free, *tables, rows, rows, rows, np.zeros((0, 0, 3)), rows, rows, 0.0, answers)
     return time.perf_counter() - start
@@ -136,22 +134,16 @@ class _Loading:
     """Held while the engine is imported; a process is not forked before that is done, nor while numba compiles.
 
     Numba's lock, and Python's own of modules that are being imported, would stay locked in the child. Unlike what
-    `forking.Lock` guards, what they guard cannot be begun anew.
+    `system.locks.Lock` guards, what they guard cannot be begun anew.
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
         self._compiling: Any = None
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
 
     def before_fork(self) -> None:
         """Wait until nothing is imported or compiled, and keep it so."""
-        self._lock.acquire()
+        self.lock.acquire()
         # Not imported by anybody: then nothing compiles.
         module = sys.modules.get("numba.core.compiler_lock")
         self._compiling = getattr(module, "global_compiler_lock", None)
@@ -162,7 +154,7 @@ class _Loading:
         """Go on, in the parent and in the child."""
         if self._compiling is not None:
             self._compiling.release()
-        self._lock.release()
+        self.lock.release()
 
 
 _loading = _Loading()
@@ -173,12 +165,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def entries() -> Any:
-    """Return the module of compiled functions; imported when asked for: numba is slow to import, and an extra.
+    """Return the module of compiled functions; imported when first used: numba is slow to import, and an extra.
 
     Raises:
         ValueError: numba finds no folder to keep them.
     """
-    with _loading:
+    with _loading.lock:
         try:
             return import_module(".kernels.entries", __package__)
         except RuntimeError as error:

@@ -15,10 +15,10 @@ from ...kinematics.transforms import inverse, transform
 from ...model.environment import Boundary
 from ...pairs import Pair
 from ..containment import ROUNDING
-from ..surfaces import Surface, Surfaces
+from ..surfaces import Surfaces
 from .motions import Motions
-from .tables import BoundaryKind, Table, packed
-from .wide_tree import LANES, WideTree, box_tree, depth, wide_tree
+from .tables import LANES, BoundaryKind, Tables, packed
+from .wide_tree import WideTree, box_tree, depth, wide_tree
 
 
 def program(
@@ -33,7 +33,7 @@ def program(
         surfaces: Of all bodies.
     """
     shapes = _Shapes(surfaces)
-    parts = [p for r in assembly.robots for p in r.links]
+    parts = assembly.links
     motions = Motions()
     steps: list[int] = []
     for robot, columns in zip(assembly.robots, space.robot_slices, strict=True):
@@ -45,25 +45,36 @@ def program(
         (step, shapes.number(name), obstacles.root([p.other for p in pairs if p.link == name and p.kind == "obstacle"]))
         for name, step in zip(number, steps, strict=True)
     ]
-    vertices = [_into(shapes.frame(p.name), p.mesh.vertices[np.unique(p.mesh.faces)]) for p in parts]
+    vertices = [_into(shapes.frame(p.name), p.mesh.used_vertices) for p in parts]
     first = np.cumsum([0, *map(len, vertices)])
     constants, of_steps = motions.arrays()
     kind, bounds = _bounds(assembly.environment.boundary)
-    tables = {
-        Table.STEPS: of_steps,
-        Table.CONSTANTS: constants,
-        Table.LINKS: [(*link, first[i], first[i + 1]) for i, link in enumerate(links)],
-        Table.PAIRS: [(number[p.link], number[p.other]) for p in pairs if p.kind != "obstacle"],
-        Table.COUNTS: (int(kind), obstacles.stack, shapes.stack),
-        Table.LIMITS: np.stack(space.joint_limits, axis=1),
-        Table.VERTICES: _joined(vertices),
-        Table.BOUNDARY: bounds,
-    }
-    return packed(tables | shapes.tables() | obstacles.tables())
+    rows, halves, children = shapes.rows()
+    tables = Tables(
+        steps=of_steps,
+        links=[(*link, first[i], first[i + 1]) for i, link in enumerate(links)],
+        shapes=rows,
+        children=children,
+        obstacles=obstacles.shapes,
+        top_children=_joined(obstacles.child),
+        pairs=[(number[p.link], number[p.other]) for p in pairs if p.kind != "obstacle"],
+        counts=(int(kind), obstacles.stack, shapes.stack),
+        constants=constants,
+        halves=halves,
+        boxes=_joined([t.boxes for t in shapes.trees]),
+        blocks=_joined([t.blocks for t in shapes.trees]),
+        points=_joined(shapes.points),
+        poses=[p[:3].ravel() for p in obstacles.poses],
+        top_boxes=_joined(obstacles.boxes),
+        limits=np.stack(space.joint_limits, axis=1),
+        vertices=_joined(vertices),
+        boundary=bounds,
+    )
+    return packed(tables)
 
 
 def _bounds(boundary: Boundary | None) -> tuple[BoundaryKind, Floats]:
-    """Return what links must stay within, as `Table.BOUNDARY` has it, with room for rounding."""
+    """Return what links must stay within, as `Tables.boundary` has it, with room for rounding."""
     bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
     if boundary is None:
         return BoundaryKind.NONE, bounds
@@ -85,14 +96,14 @@ class _Shapes:
         self._surfaces = surfaces
         count = len(surfaces.trees.roots)
         self._frames = [_frame(surfaces, k) for k in range(count)]
-        self._trees: list[WideTree] = []
-        self._components: list[Floats] = []
+        self.trees: list[WideTree] = []
+        self.points: list[Floats] = []
         for k in range(count):
             surface = surfaces.surface(k)
-            self._trees.append(wide_tree(_into(self._frames[k], surface.triangles)))
-            self._components.append(_into(self._frames[k], surface.points))
+            self.trees.append(wide_tree(_into(self._frames[k], surface.triangles)))
+            self.points.append(_into(self._frames[k], surface.points))
         # Walks over two trees hold two numbers for each place, and at most one lane less than a node's on each level.
-        deepest = max((depth(t.child) for t in self._trees), default=1)
+        deepest = max((depth(t.child) for t in self.trees), default=1)
         self.stack = 2 * LANES * (2 * deepest + 1)
 
     def number(self, name: str) -> int:
@@ -108,17 +119,17 @@ class _Shapes:
     def box(self, number: int) -> Floats:
         """Return the half sizes of a shape's box."""
         box = self._surfaces.surface(number).box
-        return self._trees[number].boxes[0, 3:, 0] if box is None else np.sort(box.half_sizes)[::-1]
+        return self.trees[number].boxes[0, 3:, 0] if box is None else np.sort(box.half_sizes)[::-1]
 
-    def tables(self) -> dict[Table, object]:
-        """Return the tables of shapes and their trees."""
-        nodes = np.cumsum([0, *(len(t.child) for t in self._trees)])
-        blocks = np.cumsum([0, *(len(t.blocks) for t in self._trees)])
-        points = np.cumsum([0, *(len(c) for c in self._components)])
+    def rows(self) -> tuple[list[tuple[int, ...]], list[tuple[float, ...]], NDArray[Any]]:
+        """Return the tables of shapes, of half sizes, and of the children of the trees' nodes."""
+        nodes = np.cumsum([0, *(len(t.child) for t in self.trees)])
+        blocks = np.cumsum([0, *(len(t.blocks) for t in self.trees)])
+        points = np.cumsum([0, *map(len, self.points)])
         children: list[Ints] = []
         rows: list[tuple[int, ...]] = []
         halves: list[tuple[float, ...]] = []
-        for k, tree in enumerate(self._trees):
+        for k, tree in enumerate(self.trees):
             child = np.where(tree.child > 0, tree.child + nodes[k], tree.child)
             children.append(np.where(tree.child < 0, tree.child - blocks[k], child))
             surface = self._surfaces.surface(k)
@@ -126,15 +137,10 @@ class _Shapes:
             # The root has one lane, the whole, which is tested before walks begin; unless that is all there is.
             start = nodes[k] + max(int(tree.child[0, 0]), 0)
             rows.append((int(nodes[k]), int(start), *kind, int(points[k]), int(points[k + 1])))
-            halves.append((*self.box(k), _smallest_component(surface)))
-        return {
-            Table.SHAPES: rows,
-            Table.HALVES: halves,
-            Table.CHILDREN: _joined(children),
-            Table.BOXES: _joined([t.boxes for t in self._trees]),
-            Table.BLOCKS: _joined([t.blocks for t in self._trees]),
-            Table.POINTS: _joined(self._components),
-        }
+            # The least diagonal of a component's box, where it is known.
+            size = float(np.linalg.norm(np.ptp(surface.corners, axis=0))) if len(surface.points) == 1 else 0.0
+            halves.append((*self.box(k), size))
+        return rows, halves, _joined(children)
 
 
 class _Obstacles:
@@ -142,14 +148,14 @@ class _Obstacles:
 
     def __init__(self, assembly: Assembly, shapes: _Shapes) -> None:
         self._names = [p.name for p in assembly.obstacles]
-        self._shapes = [shapes.number(n) for n in self._names]
-        self._poses = [p.pose @ shapes.frame(p.name) for p in assembly.obstacles]
+        self.shapes = [shapes.number(n) for n in self._names]
+        self.poses = [p.pose @ shapes.frame(p.name) for p in assembly.obstacles]
         corners = [p.analysis.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles]
         self._low = np.array([c.min(axis=0) for c in corners]).reshape(-1, 3)
         self._high = np.array([c.max(axis=0) for c in corners]).reshape(-1, 3)
         self._roots: dict[frozenset[str], int] = {frozenset(): -1}
-        self._boxes: list[Floats] = []
-        self._child: list[Ints] = []
+        self.boxes: list[Floats] = []
+        self.child: list[Ints] = []
         self.stack = LANES
 
     def root(self, names: Sequence[str]) -> int:
@@ -159,25 +165,16 @@ class _Obstacles:
             rows = np.array([i for i, n in enumerate(self._names) if n in key], dtype=np.int64)
             boxes, child = box_tree(self._low[rows], self._high[rows])
             self.stack = max(self.stack, LANES * (depth(child) + 1))
-            first = sum(map(len, self._child))
+            first = sum(map(len, self.child))
             # The root has one lane, the whole; walks begin below it, unless that is all there is.
             start = first + max(int(child[0, 0]), 0)
             leaf = child < 0
             child[leaf] = ~rows[~child[leaf]]
             child[child > 0] += first
             self._roots[key] = start
-            self._boxes.append(boxes)
-            self._child.append(child)
+            self.boxes.append(boxes)
+            self.child.append(child)
         return self._roots[key]
-
-    def tables(self) -> dict[Table, object]:
-        """Return the tables of obstacles and the trees over them."""
-        return {
-            Table.OBSTACLES: self._shapes,
-            Table.POSES: [p[:3].ravel() for p in self._poses],
-            Table.TOP_BOXES: _joined(self._boxes),
-            Table.TOP_CHILDREN: _joined(self._child),
-        }
 
 
 def _frame(surfaces: Surfaces, number: int) -> Floats:
@@ -200,11 +197,6 @@ def _into(frame: Floats, points: Floats) -> Floats:
     """Return points, (..., 3), in a frame."""
     back = inverse(frame)
     return points @ back[:3, :3].T + back[:3, 3]
-
-
-def _smallest_component(surface: Surface) -> float:
-    """Return the least diagonal of a component's box; 0 if it is not known."""
-    return float(np.linalg.norm(np.ptp(surface.corners, axis=0))) if len(surface.points) == 1 else 0.0
 
 
 def _joined(arrays: Sequence[Floats] | Sequence[Ints]) -> NDArray[Any]:

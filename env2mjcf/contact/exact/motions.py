@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -29,35 +28,18 @@ class Motion(IntEnum):
     """Rz Ry Rx and a translation, in the world."""
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One frame: that of its parent, times a constant, times a motion.
-
-    Attributes:
-        parent: Index of an earlier step, or `WORLD`.
-        constant: (4, 4).
-        motion: What follows the constant.
-        columns: Of the configuration: six for a base (x, y, z, rx, ry, rz), else one in the first place.
-    """
-
-    parent: int
-    constant: Floats
-    motion: Motion
-    columns: tuple[int, ...] = (WORLD,) * 6
-
-
 _BASE = (DofKind.X, DofKind.Y, DofKind.Z, DofKind.RX, DofKind.RY, DofKind.RZ)
 
 
 class Motions:
-    """The steps that place frames fixed to the bodies of all robots.
+    """The steps that place frames fixed to the bodies of all robots; parents come first.
 
-    Attributes:
-        steps: In an order in which parents come first.
+    Each is the frame of an earlier step, or of the `WORLD`, times a constant, times a motion.
     """
 
     def __init__(self) -> None:
-        self.steps: list[Step] = []
+        self._constants: list[Floats] = []
+        self._numbers: list[tuple[int, ...]] = []
 
     def add(self, robot: RobotKinematics, first: int, frames: Sequence[Floats]) -> list[int]:
         """Add a robot.
@@ -83,21 +65,21 @@ class Motions:
                 if motion is Motion.NONE:
                     tail = tail @ value
                 else:
-                    self.steps.append(Step(step, tail, motion, (int(value), *(WORLD,) * 5)))
-                    step, tail = len(self.steps) - 1, np.eye(4)
+                    step, tail = self._add(step, tail, motion, (int(value), *(WORLD,) * 5)), np.eye(4)
             tails[body] = step, tail
-        placed: list[int] = []
-        for body, frame in enumerate(frames):
-            step, tail = tails[body]
-            self.steps.append(Step(step, tail @ frame, Motion.NONE))
-            placed.append(len(self.steps) - 1)
-        return placed
+        return [self._add(tails[i][0], tails[i][1] @ frame, Motion.NONE) for i, frame in enumerate(frames)]
 
     def arrays(self) -> tuple[Floats, Ints]:
-        """Return constants (s, 12), rows of the upper three rows, and (s, 8) parents, motions and columns."""
-        constants = np.array([s.constant[:3].ravel() for s in self.steps]).reshape(-1, 12)
-        numbers = [(s.parent, int(s.motion), *s.columns) for s in self.steps]
-        return constants, np.array(numbers, dtype=np.int64).reshape(-1, 8)
+        """Return constants (s, 12), rows of the upper three rows, and (s, 8) parents, motions and columns.
+
+        Columns are those of the configuration: six for a base (x, y, z, rx, ry, rz), else one in the first place.
+        """
+        return np.reshape(self._constants, (-1, 12)), np.array(self._numbers, dtype=np.int64).reshape(-1, 8)
+
+    def _add(self, parent: int, constant: Floats, motion: Motion, columns: tuple[int, ...] = (WORLD,) * 6) -> int:
+        self._constants.append(constant[:3].ravel())
+        self._numbers.append((parent, int(motion), *columns))
+        return len(self._numbers) - 1
 
     def _base(
         self, robot: RobotKinematics, body: int, columns: dict[tuple[int | None, int, DofKind], int]
@@ -105,8 +87,7 @@ class Motions:
         if robot.tree.bases[body] is BaseKind.FIXED:
             return WORLD, pose_matrix(robot.multibody.bodies[body].pose)
         own = tuple(columns.get((None, body, kind), WORLD) for kind in _BASE)
-        self.steps.append(Step(WORLD, np.eye(4), Motion.BASE, own))
-        return len(self.steps) - 1, np.eye(4)
+        return self._add(WORLD, np.eye(4), Motion.BASE, own), np.eye(4)
 
 
 def _elements(

@@ -12,12 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.topology import Floats, Ints
-
-LANES = 8
-"""Boxes of a node."""
-
-BLOCK = 4
-"""Triangles of a leaf."""
+from .tables import BLOCK, LANES
 
 # Of an unused lane: no box is near it. Finite, because compiled code takes for granted that nothing is infinite.
 _NOWHERE = -1e150
@@ -81,10 +76,6 @@ class _Branch:
     low: Floats
     high: Floats
     halves: tuple[int, int] | None = None
-
-    @property
-    def surface(self) -> float:
-        return float(_surface(self.high - self.low))
 
 
 class _Builder:
@@ -164,7 +155,7 @@ class _Builder:
 
     def _weight(self, branch: int) -> tuple[float, int]:
         b = self._branches[branch]
-        return b.surface, b.stop - b.start
+        return float(_surface(b.high - b.low)), b.stop - b.start
 
     def _widen(self) -> None:
         """Give each node the branches that are left when the widest of its branches are opened, until it is full."""

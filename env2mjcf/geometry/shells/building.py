@@ -10,8 +10,8 @@ import numpy as np
 from ...limits import Work
 from ..analysis import Analysis
 from ..coplanar import Polygon, convex_polygons
-from ..pieces import SLENDEREST, ConvexPiece, prisms, too_narrow
-from ..topology import Ints
+from ..pieces import SLENDEREST, ConvexPiece, frozen_piece, prisms, too_narrow
+from ..topology import Ints, edges
 from .cells import Group, cell_corners, groups
 from .fitting import Surroundings, fit
 from .pairing import doubtful_polygons, pair_sides
@@ -22,7 +22,6 @@ THICKEST = 0.02
 
 _THINNEST = 5e-6
 """Least height of a cell in units of the mesh's diagonal; below it a thin prism stands for the polygon."""
-
 
 _EXACT = 2e-10
 """What counts as nothing, in units of the mesh's diagonal: bent polygons and grazing triangles, two of each at worst,
@@ -67,11 +66,12 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     work = work or Work()
     vertices, chosen = analysis.vertices, analysis.faces[faces]
     nothing = _EXACT * analysis.diagonal
-    polygons = convex_polygons(vertices, chosen, nothing)
+    table = edges(chosen)
+    polygons = convex_polygons(vertices, chosen, nothing, table)
     normals = np.empty((len(chosen), 3))
     for polygon in polygons:
         normals[list(polygon.faces)] = polygon.normal
-    sides = pair_sides(vertices, chosen, normals, work)
+    sides = pair_sides(vertices, chosen, table, normals, work)
     solid = np.where(analysis.component_volumes > 0, np.arange(analysis.components), -1)[analysis.component]
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
     around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing, work)
@@ -135,8 +135,5 @@ def _cells(
     for row in np.flatnonzero(good).tolist():
         points = corners.points[row][corners.used[row]]
         mean = points.mean(axis=0)
-        local, center = points - mean, group.centers[row] + mean
-        local.setflags(write=False)
-        center.setflags(write=False)
-        piece = ConvexPiece(local, center, polygons[group.members[row]])
+        piece = frozen_piece(points - mean, group.centers[row] + mean, polygons[group.members[row]])
         yield row, _Cell(piece, float(corners.depths[row]), float(corners.volumes[row]), bool(group.tilted[row]))

@@ -1,12 +1,12 @@
-"""The half-spaces that bound the cell under each polygon, kept in groups of polygons with equally many corners.
+"""The cell under each polygon: the half-spaces that bound it, and the corners of what lies in all of them.
 
-MERGED: The corners of the cells: a convex polygon whose edges move as the depth grows, each at its own speed.
+Cells are kept in groups of polygons with equally many corners.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,18 +49,19 @@ class Group:
     reach: Floats
     slopes: Floats
     height: Floats
-    tilted: Bools = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.tilted = np.zeros(len(self.members), dtype=np.bool_)
+    tilted: Bools
 
     def __len__(self) -> int:
         return len(self.members)
 
     def depth(self) -> Floats:
         """Return how deep each cell is below its centre, (g,)."""
-        limits = np.divide(self.reach, self.slopes, out=np.full(self.slopes.shape, np.inf), where=self.slopes > 0)
-        return np.minimum(self.height, limits.min(axis=1))
+        return np.minimum(self.height, self.limits(np.arange(len(self))).min(axis=1))
+
+    def limits(self, rows: Ints) -> Floats:
+        """Return how deep each side of some cells lets them be below their centres, (len(rows), k)."""
+        reach, slopes = self.reach[rows], self.slopes[rows]
+        return np.divide(reach, slopes, out=np.full(slopes.shape, np.inf), where=slopes > 0)
 
     def planes(self, rows: Ints, margin: float) -> Floats:
         """Return the planes (len(rows), k + 2, 4) of some cells about their centres, moved inward by a margin.
@@ -87,9 +88,17 @@ class Group:
         after = np.minimum(self.slopes, 0.0)
         before = np.roll(after, 1, axis=1)
         u, v, n = np.roll(self.inward, 1, axis=1), self.inward, self.normals[:, None]
-        sine = np.einsum("gkj,gkj->gk", np.broadcast_to(n, u.shape), np.cross(u, v))[:, :, None]
-        move = before[:, :, None] * np.cross(v, n) + after[:, :, None] * np.cross(n, u)
-        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
+        return _corner_speed(before, after, u, v, np.broadcast_to(n, u.shape))
+
+
+def _corner_speed(before: Floats, after: Floats, u: Floats, v: Floats, normal: Floats) -> Floats:
+    """Return how corners move per unit of depth, (..., 3), between edges with inward vectors u and v and such slopes.
+
+    Parallel edges have no corner that moves.
+    """
+    sine = np.einsum("...j,...j->...", normal, np.cross(u, v))[..., None]
+    move = before[..., None] * np.cross(v, normal) + after[..., None] * np.cross(normal, u)
+    return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
 
 
 def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slopes: Floats, cap: float) -> list[Group]:
@@ -99,7 +108,7 @@ def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slop
         vertices: (n, 3).
         faces: (m, 3).
         polygons: Convex polygons of whole faces.
-        face_slopes: (m, 3) from `side_slopes`.
+        face_slopes: (m, 3) `Sides.slopes`.
         cap: Greatest height of a cell.
     """
     loops = corner_loops(vertices, polygons)
@@ -128,6 +137,7 @@ def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, he
         reach=-np.einsum("gkj,gkj->gk", inward, local),
         slopes=slopes,
         height=np.full(len(members), height),
+        tilted=np.zeros(len(members), dtype=np.bool_),
     )
 
 
@@ -264,12 +274,11 @@ class _Shrinking:
         self._ended[rows[over]] = True
 
     def _meeting(self, rows: Ints, first: Ints, second: Ints) -> Floats:
-        """Return how the corner between two edges moves per unit of depth, (r, 3); parallel edges have none."""
-        group = self._group
-        u, v, n = group.inward[rows, first], group.inward[rows, second], group.normals[rows]
-        sine = np.einsum("gj,gj->g", n, np.cross(u, v))[:, None]
-        move = group.slopes[rows, first, None] * np.cross(v, n) + group.slopes[rows, second, None] * np.cross(n, u)
-        return np.divide(move, sine, out=np.zeros_like(move), where=np.abs(sine) > PARALLEL)
+        """Return how the corner between two edges moves per unit of depth, (r, 3)."""
+        slopes, inward, normals = self._group.slopes, self._group.inward, self._group.normals[rows]
+        return _corner_speed(
+            slopes[rows, first], slopes[rows, second], inward[rows, first], inward[rows, second], normals
+        )
 
     def _sweep(self, rows: Ints, depth: Floats) -> None:
         """Add the volume between the last depth and this one; areas are quadratic in depth, so Simpson is exact."""
@@ -293,16 +302,13 @@ def _replace_by_frustums(
 ) -> None:
     k = group.corners.shape[1]
     rows = np.flatnonzero(spoiled)
-    limits = np.divide(group.reach, group.slopes, out=np.full(group.slopes.shape, np.inf), where=group.slopes > 0)
-    limit = limits.min(axis=1)[rows]
+    limit = group.limits(rows).min(axis=1)
     depth = np.minimum(group.height[rows], limit / 2)
     scale = 1 - np.divide(depth, limit, out=np.ones_like(limit), where=limit > 0)
     top = group.corners[rows]
     points[rows], used[rows] = 0.0, False
-    points[rows, :k], points[rows, k : 2 * k] = (
-        top,
-        top * scale[:, None, None] - (group.normals[rows] * depth[:, None])[:, None],
-    )
+    points[rows, :k] = top
+    points[rows, k : 2 * k] = top * scale[:, None, None] - (group.normals[rows] * depth[:, None])[:, None]
     used[rows, : 2 * k] = True
     depths[rows] = depth
     area = np.einsum("gkj,gj->g", np.cross(top, np.roll(top, -1, axis=1)), group.normals[rows]) / 2

@@ -1,8 +1,6 @@
-"""Which triangles come near which cells.
+"""How thick a cell may be: no other triangle of the surface may reach into it.
 
-MERGED: Many small convex polygons cut by planes at once.
-
-MERGED: How thick a cell may be: no other triangle of the surface may reach into it.
+Boxes tell which triangles come near which cells; those are cut by the planes of the cell, many at once.
 """
 
 from __future__ import annotations
@@ -17,6 +15,8 @@ from ..topology import Bools, Floats, Ints
 from .cells import Group
 
 _BLOCK = 64
+_NUMBERS = 3_000_000  # heights held in memory at once
+_ROUNDS = 200
 
 
 def near(low: Floats, high: Floats, lows: Floats, highs: Floats, work: Work) -> tuple[Ints, Ints]:
@@ -93,10 +93,6 @@ def _cut(points: Floats, count: Ints, plane: Floats) -> tuple[Floats, Ints]:
     left = kept.sum(axis=1).astype(np.int64)
     order = np.argsort(~kept, axis=1, kind="stable")[:, : max(1, int(left.max(initial=0)))]
     return np.take_along_axis(both, order[:, :, None], axis=1), left
-
-
-_NUMBERS = 3_000_000  # heights held in memory at once
-_ROUNDS = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,11 +192,9 @@ def _give_way(group: Group, cell: Ints, start: Floats, ratio: Floats) -> None:
     Either the cell ends halfway above the piece, or one side leans to halfway past it: whichever leaves more depth
     below the centre.
     """
-    reach, slopes = group.reach[cell], group.slopes[cell]
-    limits = np.divide(reach, slopes, out=np.full(slopes.shape, np.inf), where=slopes > 0)
-    limits = np.minimum(limits, group.height[cell, None])
+    limits = np.minimum(group.limits(cell), group.height[cell, None])
     lowered = np.minimum(start / 2, limits.min(axis=1))
-    room = np.divide(reach, 2 * ratio, out=np.full(ratio.shape, np.inf), where=ratio > 0)
+    room = np.divide(group.reach[cell], 2 * ratio, out=np.full(ratio.shape, np.inf), where=ratio > 0)
     leaning = np.minimum(room, _least_of_others(limits))
     side = leaning.argmax(axis=1)
     best = np.maximum(lowered, leaning.max(axis=1))

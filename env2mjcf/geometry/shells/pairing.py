@@ -1,6 +1,5 @@
-"""Which two faces bound the solid at an edge, and how the sides of their cells lean there.
-
-MERGED: Polygons of a folded or crossing surface under which there is no solid.
+"""Where the solid is: which two faces bound it at an edge, how the sides of their cells lean there, and which polygons
+of a folded or crossing surface have no solid under them.
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ import numpy as np
 from ...limits import Work
 from ..analysis import Analysis
 from ..coplanar import Polygon
-from ..orientation import winding_numbers
+from ..orientation import encloses
 from ..pieces import ConvexPiece
-from ..topology import Floats, Ints, connected, edges
+from ..topology import Edges, Floats, Ints, connected
 
 # Angles in radians below which two faces coincide: the solid that touches here is another one.
 _COINCIDENT = 1e-6
@@ -40,7 +39,7 @@ class Sides:
     folded: bool
 
 
-def pair_sides(vertices: Floats, faces: Ints, normals: Floats, work: Work | None = None) -> Sides:
+def pair_sides(vertices: Floats, faces: Ints, table: Edges, normals: Floats, work: Work) -> Sides:
     """Find the partner of each face at each of its edges, and how the cell's side leans there.
 
     At a convex edge the side lies in the partner's face, and leans outward at an obtuse one, so that the cell fills
@@ -54,14 +53,14 @@ def pair_sides(vertices: Floats, faces: Ints, normals: Floats, work: Work | None
     Args:
         vertices: (n, 3).
         faces: (m, 3) counter-clockwise from outside.
+        table: `edges(faces)`.
         normals: (m, 3) unit normals.
-        work: What may be done; None sets no bound.
+        work: What may be done.
 
     Raises:
         TooMuchWorkError: So many faces meet at edges that it takes more.
     """
-    table = edges(faces)
-    (work or Work()).spend(int((table.faces**2).sum()))
+    work.spend(int((table.faces**2).sum()))
     corner = np.argsort(table.of_corner.ravel(), kind="stable")
     start = np.concatenate([[0], np.cumsum(table.faces)[:-1]]).astype(np.int64)
     along = vertices[faces[:, (1, 2, 0)]] - vertices[faces]
@@ -107,28 +106,29 @@ def doubtful_polygons(
 
     Such are the parts of a flat cap that is folded over itself: covered twice one way, and once the other. In a
     surface without folds and crossings all cells that are linked side to side are inside or outside together,
-    because no face passes through a cell: one of them is asked. Else every cell is asked.
+    because no face passes through a cell: one of them is looked at. Else every cell is.
 
     Args:
         analysis: The mesh.
         polygons: Of the surface.
         cells: The cells of each polygon; none where there was no room.
         sides: How faces are paired at their edges.
-        thickness: Depth at which polygons without a cell are asked.
+        thickness: Depth at which polygons without a cell are looked at.
         work: What may be done.
     """
     # A surface that passes through itself, or touches itself, leaves no room for some cell, or cuts it.
     suspect = sides.folded or any(len(own) != 1 for own in cells)
     patch = np.arange(len(polygons)) if suspect else _patches(polygons, sides.links)
     some = range(len(cells)) if suspect else np.unique(patch, return_index=True)[1].tolist()
-    asked = [(i, cell) for i in some for cell in cells[i]]
-    insides = np.reshape([cell.center for _, cell in asked], (-1, 3))
-    outside = ~_inside(analysis, insides, work)
-    wrong = patch[[i for (i, _), out in zip(asked, outside.tolist(), strict=True) if out]]
+    tested = [(i, cell) for i in some for cell in cells[i]]
+    insides = np.reshape([cell.center for _, cell in tested], (-1, 3))
+    outside = ~encloses(analysis.vertices, analysis.faces, insides, work)
+    wrong = patch[[i for (i, _), out in zip(tested, outside.tolist(), strict=True) if out]]
     doubtful = [i for i, own in enumerate(cells) if not own or patch[i] in wrong]
     middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
-    turn = ~_inside(analysis, middles - step, work) & _inside(analysis, middles + step, work)
+    under, over = (encloses(analysis.vertices, analysis.faces, p, work) for p in (middles - step, middles + step))
+    turn = ~under & over
     return {
         i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal) if t else polygons[i]
         for i, t in zip(doubtful, turn.tolist(), strict=True)
@@ -141,7 +141,3 @@ def _patches(polygons: Sequence[Polygon], links: Ints) -> Ints:
     for i, polygon in enumerate(polygons):
         of_face[list(polygon.faces)] = i
     return connected(len(polygons), of_face[links[:, 0]], of_face[links[:, 1]])
-
-
-def _inside(analysis: Analysis, points: Floats, work: Work) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return np.abs(winding_numbers(points, analysis.vertices, analysis.faces, work)) > 0.5

@@ -1,7 +1,4 @@
-"""Large polygons with a thin spot: cut, so that only what lies over the spot is thin.
-
-MERGED: Convex polygons in a plane of their own, and cuts through them.
-"""
+"""Large polygons with a thin spot: cut in their own plane, so that only what lies over the spot is thin."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..topology import Floats
+from ..topology import Bools, Floats
 from .cells import Group, group_of
 from .fitting import Surroundings, fit, within
 
@@ -22,6 +19,9 @@ _SPOT = 8.0
 
 _LEAST_SHARE = 0.1
 """Least area beside the spot, in units of the polygon's, that is worth a cell of its own."""
+
+_ON = 1e-9
+"""Distance from a cut, in units of the polygon's size, below which a corner lies on it."""
 
 _CUTS = 4
 _ROUNDS = 3
@@ -51,7 +51,7 @@ def split_thin(group: Group, wanted: Floats, around: Surroundings, cap: float) -
     return out
 
 
-def _worth_cutting(group: Group, cap: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _worth_cutting(group: Group, cap: float) -> Bools:
     """Tell which cells are thin, and wide enough for parts that are wider than deep, (g,)."""
     across = np.einsum("gej,gvj->gev", group.inward, group.corners)
     width = np.ptp(across, axis=2).min(axis=1)
@@ -107,10 +107,6 @@ def _cut_free(part: FlatPolygon, spot: Floats, cap: float) -> tuple[list[FlatPol
         free.append(best)
         part = rest
     return free, part
-
-
-# Distance from a cut, in units of the polygon's size, below which a corner lies on it.
-_ON = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)

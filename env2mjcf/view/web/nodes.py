@@ -202,7 +202,7 @@ def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
     lower, upper = assembly.lower, assembly.upper
     if len(rows) and scene.link_names:
         poses = scene.link_poses(rows)
-        for i, part in enumerate(p for r in assembly.robots for p in r.links):
+        for i, part in enumerate(assembly.links):
             corners = _corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
             world = np.einsum("nij,cj->nci", poses[:, i, :3, :3], corners) + poses[:, i, None, :3, 3]
             lower, upper = np.minimum(lower, world.min(axis=(0, 1))), np.maximum(upper, world.max(axis=(0, 1)))

@@ -11,7 +11,8 @@ from scenes import MODELS
 
 import env2mjcf
 from env2mjcf.contact.exact.motions import Motions
-from env2mjcf.contact.exact.wide_tree import BLOCK, LANES, box_tree, depth, wide_tree
+from env2mjcf.contact.exact.tables import BLOCK, LANES
+from env2mjcf.contact.exact.wide_tree import box_tree, depth, wide_tree
 from env2mjcf.geometry.distance import nearest
 from env2mjcf.geometry.orientation import winding_numbers
 from env2mjcf.kinematics.transforms import rotation_matrix, transform

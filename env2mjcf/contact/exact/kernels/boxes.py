@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..tables import LANES
 from .compiling import compiled
 from .poses import Pose, larger, sizes
-
-_LANES = 8
 
 
 @compiled
@@ -40,13 +39,9 @@ def boxes_apart(m: Pose, a0: float, a1: float, a2: float, b0: float, b1: float, 
 
 @compiled
 def lanes_near(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1: float, a2: float) -> int:
-    """Return the lanes whose boxes overlap another box, as bits.
+    """Return the lanes of a node, (48,), whose boxes overlap a box with centre c and half sizes a, as bits.
 
-    Args:
-        row: (48,) the boxes of a node.
-        m: The pose of their frame in the other box's.
-        c0, c1, c2: The other box's centre.
-        a0, a1, a2: Its half sizes.
+    The pose m is that of the node's frame in the box's.
     """
     r00, r01, r02, t0, r10, r11, r12, t1, r20, r21, r22, t2 = m
     s00, s01, s02, s10, s11, s12, s20, s21, s22 = sizes(m)
@@ -57,7 +52,7 @@ def lanes_near(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1
     v10, v11, v12 = a0 * s20 + a2 * s00, a0 * s21 + a2 * s01, a0 * s22 + a2 * s02
     v20, v21, v22 = a0 * s10 + a1 * s00, a0 * s11 + a1 * s01, a0 * s12 + a1 * s02
     near = 0
-    for k in range(_LANES):
+    for k in range(LANES):
         p0, p1, p2, b0, b1, b2 = row[k], row[8 + k], row[16 + k], row[24 + k], row[32 + k], row[40 + k]
         x = r00 * p0 + r01 * p1 + r02 * p2 + t0
         y = r10 * p0 + r11 * p1 + r12 * p2 + t1
@@ -85,7 +80,7 @@ def lanes_near(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1
 def lanes_about(row: Any, x: float, y: float, z: float, a0: float, a1: float, a2: float) -> int:
     """Return the lanes whose boxes overlap a box of the same frame, as bits."""
     near = 0
-    for k in range(_LANES):
+    for k in range(LANES):
         gap = abs(row[k] - x) - (row[24 + k] + a0)
         gap = larger(gap, abs(row[8 + k] - y) - (row[32 + k] + a1))
         gap = larger(gap, abs(row[16 + k] - z) - (row[40 + k] + a2))

@@ -1,6 +1,6 @@
-"""How functions are compiled: without Python's lock, and with multiplications fused to additions.
+"""How functions are compiled, without Python's lock and with multiplications fused to additions; and what they work on.
 
-MERGED: Views of the tables that `tables.packed` has put one after the other, and room to work in.
+That is views of the tables that `tables.packed` has put one after the other, and room to work in.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numba
 import numpy as np
 
-from ..tables import WIDTHS, Table
+from ..tables import WIDTHS, Tables
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -69,41 +69,9 @@ def entry(function: F) -> F:
     return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", cache=True)(function))
 
 
-_WIDTHS = WIDTHS
-_STEPS, _LINKS, _SHAPES, _CHILDREN = int(Table.STEPS), int(Table.LINKS), int(Table.SHAPES), int(Table.CHILDREN)
-_OBSTACLES, _TOP_CHILDREN, _PAIRS = int(Table.OBSTACLES), int(Table.TOP_CHILDREN), int(Table.PAIRS)
-_COUNTS, _CONSTANTS, _HALVES = int(Table.COUNTS), int(Table.CONSTANTS), int(Table.HALVES)
-_BOXES, _BLOCKS, _POINTS = int(Table.BOXES), int(Table.BLOCKS), int(Table.POINTS)
-_POSES, _TOP_BOXES, _LIMITS = int(Table.POSES), int(Table.TOP_BOXES), int(Table.LIMITS)
-_VERTICES, _BOUNDARY = int(Table.VERTICES), int(Table.BOUNDARY)
-
-
-class Tables(NamedTuple):
-    """The tables of `Table`, by name."""
-
-    steps: Any
-    links: Any
-    shapes: Any
-    children: Any
-    obstacles: Any
-    top_children: Any
-    pairs: Any
-    counts: Any
-    constants: Any
-    halves: Any
-    boxes: Any
-    blocks: Any
-    points: Any
-    poses: Any
-    top_boxes: Any
-    limits: Any
-    vertices: Any
-    boundary: Any
-
-
 @compiled_with_arrays
 def _view(array: Any, integers: Any, table: int) -> Any:
-    start, rows, width = integers[2 * table], integers[2 * table + 1], _WIDTHS[table]
+    start, rows, width = integers[2 * table], integers[2 * table + 1], WIDTHS[table]
     return array[start : start + rows * width].reshape(rows, width)
 
 
@@ -111,24 +79,24 @@ def _view(array: Any, integers: Any, table: int) -> Any:
 def opened(integers: Any, floats: Any) -> Tables:
     """Return views of all tables."""
     return Tables(
-        _view(integers, integers, _STEPS),
-        _view(integers, integers, _LINKS),
-        _view(integers, integers, _SHAPES),
-        _view(integers, integers, _CHILDREN),
-        _view(integers, integers, _OBSTACLES),
-        _view(integers, integers, _TOP_CHILDREN),
-        _view(integers, integers, _PAIRS),
-        _view(integers, integers, _COUNTS),
-        _view(floats, integers, _CONSTANTS),
-        _view(floats, integers, _HALVES),
-        _view(floats, integers, _BOXES),
-        _view(floats, integers, _BLOCKS),
-        _view(floats, integers, _POINTS),
-        _view(floats, integers, _POSES),
-        _view(floats, integers, _TOP_BOXES),
-        _view(floats, integers, _LIMITS),
-        _view(floats, integers, _VERTICES),
-        _view(floats, integers, _BOUNDARY),
+        _view(integers, integers, 0),
+        _view(integers, integers, 1),
+        _view(integers, integers, 2),
+        _view(integers, integers, 3),
+        _view(integers, integers, 4),
+        _view(integers, integers, 5),
+        _view(integers, integers, 6),
+        _view(integers, integers, 7),
+        _view(floats, integers, 8),
+        _view(floats, integers, 9),
+        _view(floats, integers, 10),
+        _view(floats, integers, 11),
+        _view(floats, integers, 12),
+        _view(floats, integers, 13),
+        _view(floats, integers, 14),
+        _view(floats, integers, 15),
+        _view(floats, integers, 16),
+        _view(floats, integers, 17),
     )
 
 

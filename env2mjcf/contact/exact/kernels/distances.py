@@ -1,21 +1,19 @@
-"""How near bodies are to each other that do not touch: branch and bound down pairs of trees, nearest boxes first.
-
-MERGED: The least distance over all tested pairs.
-"""
+"""How near bodies are to each other that do not touch: branch and bound down pairs of trees, nearest boxes first."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from ..tables import BLOCK, LANES, ROOT, SHAPE, STEP, TOP, Tables
 from .boxes import lanes_about
-from .compiling import Room, Tables, compiled
+from .compiling import Room, compiled
 from .poses import Pose, inverted, larger, relative, smaller
 from .separations import box_gap, lane_gaps, triangle_distance, triangle_gap
-from .touching import box_size
+from .touching import box_size, lane_box
 from .triangles import corners, placed
 
-_LANES, _BLOCK = 8, 4
-_ROOT = 0
+# Beyond everything, and nearer than the boxes of unused lanes.
+_FAR = 1e250
 
 
 @compiled
@@ -24,13 +22,7 @@ def distance(
 ) -> float:
     """Return the squared distance of shapes s and t at world poses, (12,), or the bound where that is less.
 
-    Args:
-        tables: The scene.
-        s, t: Shapes that do not touch.
-        pose_s, pose_t: Their poses.
-        bound: What is farther does not matter; squared.
-        enough: Where something is nearer than this, how near does not matter; squared.
-        room: To work in.
+    The shapes do not touch. Where something is nearer than `enough`, squared too, how near does not matter.
     """
     m = relative(pose_s, pose_t)
     if box_gap(m, tables.halves[s], tables.halves[t]) >= bound:
@@ -42,32 +34,28 @@ def distance(
 def _search(tables: Tables, s: int, t: int, m: Pose, bound: float, enough: float, room: Room) -> float:
     stack, gaps = room.stack, room.gaps
     back = inverted(m)
-    stack[0], stack[1] = tables.shapes[s, _ROOT] * _LANES, tables.shapes[t, _ROOT] * _LANES
-    gaps[_LANES] = 0.0
+    stack[0], stack[1] = tables.shapes[s, ROOT] * LANES, tables.shapes[t, ROOT] * LANES
+    gaps[LANES] = 0.0
     count = 1
     while count > 0 and bound >= enough:
         count -= 1
-        if gaps[_LANES + count] >= bound:
+        if gaps[LANES + count] >= bound:
             continue
         p, q = stack[2 * count], stack[2 * count + 1]
-        child_p, child_q = tables.children[p // _LANES, p % _LANES], tables.children[q // _LANES, q % _LANES]
+        child_p, child_q = tables.children[p // LANES, p % LANES], tables.children[q // LANES, q % LANES]
         if child_p < 0 and child_q < 0:
             bound = _between_leaves(tables.blocks[~child_p], tables.blocks[~child_q], back, bound)
             continue
-        row_p, row_q = tables.boxes[p // _LANES], tables.boxes[q // _LANES]
-        i, j = p % _LANES, q % _LANES
+        row_p, row_q = tables.boxes[p // LANES], tables.boxes[q // LANES]
+        i, j = p % LANES, q % LANES
         if child_q < 0 or (child_p >= 0 and box_size(row_p, i) > box_size(row_q, j)):
-            lane_gaps(
-                tables.boxes[child_p], back,
-                row_q[j], row_q[8 + j], row_q[16 + j], row_q[24 + j], row_q[32 + j], row_q[40 + j], gaps,
-            )  # fmt: skip
-            count = _push(child_p * _LANES, -1, q, bound, stack, gaps, count)
+            x, y, z, a, b, c = lane_box(row_q, j)
+            lane_gaps(tables.boxes[child_p], back, x, y, z, a, b, c, gaps)
+            count = _push(child_p * LANES, -1, q, bound, stack, gaps, count)
         else:
-            lane_gaps(
-                tables.boxes[child_q], m,
-                row_p[i], row_p[8 + i], row_p[16 + i], row_p[24 + i], row_p[32 + i], row_p[40 + i], gaps,
-            )  # fmt: skip
-            count = _push(child_q * _LANES, p, -1, bound, stack, gaps, count)
+            x, y, z, a, b, c = lane_box(row_p, i)
+            lane_gaps(tables.boxes[child_q], m, x, y, z, a, b, c, gaps)
+            count = _push(child_q * LANES, p, -1, bound, stack, gaps, count)
     return bound
 
 
@@ -78,17 +66,17 @@ def _push(first: int, p: int, q: int, bound: float, stack: Any, gaps: Any, count
     Of p and q the one that is negative stands for the lane.
     """
     base = count
-    for k in range(_LANES):
+    for k in range(LANES):
         gap = gaps[k]
         if gap >= bound:
             continue
         # Insertion: lanes are few.
         i = count
-        while i > base and gaps[_LANES + i - 1] < gap:
-            gaps[_LANES + i] = gaps[_LANES + i - 1]
+        while i > base and gaps[LANES + i - 1] < gap:
+            gaps[LANES + i] = gaps[LANES + i - 1]
             stack[2 * i], stack[2 * i + 1] = stack[2 * i - 2], stack[2 * i - 1]
             i -= 1
-        gaps[_LANES + i] = gap
+        gaps[LANES + i] = gap
         stack[2 * i] = first + k if p < 0 else p
         stack[2 * i + 1] = first + k if q < 0 else q
         count += 1
@@ -98,40 +86,32 @@ def _push(first: int, p: int, q: int, bound: float, stack: Any, gaps: Any, count
 @compiled
 def _between_leaves(first: Any, second: Any, back: Pose, bound: float) -> float:
     """Return the least squared distance of two leaves' triangles, or the bound; `back` is the pose of the first."""
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         triangle = placed(back, corners(first, k))
         if triangle_gap(triangle, second) < bound:
             bound = smaller(bound, triangle_distance(triangle, second))
     return bound
 
 
-_STEP, _SHAPE, _TOP = 0, 1, 2
-# Beyond everything, and nearer than the boxes of unused lanes.
-_FAR = 1e250
-
-
 @compiled
 def least_distance(tables: Tables, room: Room, most: float) -> float:
     """Return the least distance of any pair, or `most` if that is less.
 
-    Args:
-        tables: The scene.
-        room: With the robots placed in its frames, and measured; nothing touches.
-        most: What is more does not matter.
+    The robots are placed in the room's frames, and measured; nothing touches.
     """
     least = most
     for link in range(len(tables.links)):
-        if tables.links[link, _TOP] >= 0:
+        if tables.links[link, TOP] >= 0:
             # Something near first: the nearer that is, the less else is looked at.
             least = _to_obstacle(tables, link, room, _nearest_box(tables, link, room), least)
     for link in range(len(tables.links)):
-        if tables.links[link, _TOP] >= 0:
+        if tables.links[link, TOP] >= 0:
             least = _to_others(tables, link, room, _nearest_box(tables, link, room), least)
     frames = room.frames
     for i in range(len(tables.pairs)):
         a, b = tables.links[tables.pairs[i, 0]], tables.links[tables.pairs[i, 1]]
         bound = least * least
-        d = distance(tables, a[_SHAPE], frames[a[_STEP]], b[_SHAPE], frames[b[_STEP]], bound, 0.0, room)
+        d = distance(tables, a[SHAPE], frames[a[STEP]], b[SHAPE], frames[b[STEP]], bound, 0.0, room)
         if d < bound:
             least = d**0.5
     return least
@@ -140,9 +120,9 @@ def least_distance(tables: Tables, room: Room, most: float) -> float:
 @compiled
 def _to_others(tables: Tables, link: int, room: Room, known: int, least: float) -> float:
     """Return the least distance of a link from all obstacles but one, or `least` if that is less."""
-    pose = room.frames[tables.links[link, _STEP]]
+    pose = room.frames[tables.links[link, STEP]]
     span, stack = room.spans[link], room.top
-    stack[0] = tables.links[link, _TOP]
+    stack[0] = tables.links[link, TOP]
     count = 1
     while count > 0:
         count -= 1
@@ -150,7 +130,7 @@ def _to_others(tables: Tables, link: int, room: Room, known: int, least: float) 
         lanes = lanes_about(
             tables.top_boxes[node], pose[3], pose[7], pose[11], span[0] + least, span[1] + least, span[2] + least
         )
-        for k in range(_LANES):
+        for k in range(LANES):
             if lanes >> k & 1:
                 child = tables.top_children[node, k]
                 if child >= 0:
@@ -163,7 +143,7 @@ def _to_others(tables: Tables, link: int, room: Room, known: int, least: float) 
 
 @compiled
 def _to_obstacle(tables: Tables, link: int, room: Room, obstacle: int, least: float) -> float:
-    pose, shape = room.frames[tables.links[link, _STEP]], tables.links[link, _SHAPE]
+    pose, shape = room.frames[tables.links[link, STEP]], tables.links[link, SHAPE]
     bound, other = least * least, tables.obstacles[obstacle, 0]
     d = distance(tables, shape, pose, other, tables.poses[obstacle], bound, 0.0, room)
     return d**0.5 if d < bound else least
@@ -172,11 +152,11 @@ def _to_obstacle(tables: Tables, link: int, room: Room, obstacle: int, least: fl
 @compiled
 def _nearest_box(tables: Tables, link: int, room: Room) -> int:
     """Return an obstacle that is found by going to the nearest box at each level of the tree."""
-    pose, span = room.frames[tables.links[link, _STEP]], room.spans[link]
-    child = tables.links[link, _TOP]
+    pose, span = room.frames[tables.links[link, STEP]], room.spans[link]
+    child = tables.links[link, TOP]
     while child >= 0:
         row, node, least = tables.top_boxes[child], child, _FAR
-        for k in range(_LANES):
+        for k in range(LANES):
             gap = 0.0
             for i in range(3):
                 away = larger(abs(row[8 * i + k] - pose[4 * i + 3]) - row[24 + 8 * i + k] - span[i], 0.0)

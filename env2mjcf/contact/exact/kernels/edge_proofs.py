@@ -1,4 +1,4 @@
-"""Proofs that bodies stay apart on a straight way.
+"""Straight ways between configurations: looked at step by step, and proofs that bodies stay apart on them.
 
 Bodies that are d apart and come nearer by at most v a unit of time do not meet within d / v (conservative advancement:
 Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, 1996). A look at the middle of a stretch of the way
@@ -6,25 +6,20 @@ clears the pairs that are farther apart than they can come nearer; for the other
 
 What is apart at one time must touch before it crosses, edge to edge or corner to face, and before it gets inside. So
 it is enough that these distances, of edges and of corners, are nowhere too small: no look asks for crossings.
-
-
-MERGED: Straight ways between configurations, looked at step by step.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from ..tables import IS_BOX, LANES, SHAPE, STEP, TOP, Tables
 from .boxes import boxes_apart, lanes_about
-from .compiling import Room, Tables, compiled
+from .compiling import Room, compiled
 from .distances import distance
 from .poses import Pose, Vector, inverted, place, relative
 from .separations import box_gap
 from .touching import box_crosses, collides, measure
 
-_LANES = 8
-_STEP, _SHAPE, _TOP = 0, 1, 2
-_IS_BOX = 2
 _CLEAR, _OPEN, _TOO_NEAR = 0, 1, 2
 
 LEVELS = 40
@@ -39,8 +34,6 @@ def edge_is_free(
     """Return whether bodies provably stay apart on the way from `start` by `delta`.
 
     Args:
-        tables: The scene.
-        room: To work in.
         start, delta: (dim,).
         speeds, pair_speeds: (l,) and (p,) bounds of how much nearer bodies come on the whole way.
         drifts, turns: (l, 3) and (l,) what of the links' motion is one translation, and bounds of the rest.
@@ -72,12 +65,13 @@ def edge_is_free(
         place_at(tables, room, start, delta, middle)
         left = last
         for i in range(first, last):
-            speed = _speed(tables, speeds, pair_speeds, pending[i])
-            state = _look(tables, room, pending[i], speed, drifts, turns, half, margin)
+            code = pending[i]
+            speed = pair_speeds[~code] if code < 0 else speeds[code // len(tables.obstacles)]
+            state = _look(tables, room, code, speed, drifts, turns, half, margin)
             if state == _TOO_NEAR:
                 return False
             if state == _OPEN:
-                pending[left] = pending[i]
+                pending[left] = code
                 left += 1
         if left == last:
             continue
@@ -97,10 +91,10 @@ def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: flo
     count = 0
     spans, frames, stack = room.spans, room.frames, room.top
     for link in range(len(tables.links)):
-        if tables.links[link, _TOP] < 0 or speeds[link] == 0:
+        if tables.links[link, TOP] < 0 or speeds[link] == 0:
             continue
-        pose, span, reach = frames[tables.links[link, _STEP]], spans[link], speeds[link] * time
-        stack[0] = tables.links[link, _TOP]
+        pose, span, reach = frames[tables.links[link, STEP]], spans[link], speeds[link] * time
+        stack[0] = tables.links[link, TOP]
         height = 1
         while height > 0:
             height -= 1
@@ -108,7 +102,7 @@ def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: flo
             lanes = lanes_about(
                 tables.top_boxes[node], pose[3], pose[7], pose[11], span[0] + reach, span[1] + reach, span[2] + reach
             )
-            for k in range(_LANES):
+            for k in range(LANES):
                 if lanes >> k & 1:
                     child = tables.top_children[node, k]
                     if child >= 0:
@@ -119,7 +113,7 @@ def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: flo
                         count += 1
     for i in range(len(tables.pairs)):
         a, b, reach = tables.pairs[i, 0], tables.pairs[i, 1], pair_speeds[i] * time
-        p, q = frames[tables.links[a, _STEP]], frames[tables.links[b, _STEP]]
+        p, q = frames[tables.links[a, STEP]], frames[tables.links[b, STEP]]
         if reach > 0 and (
             abs(p[3] - q[3]) <= spans[a, 0] + spans[b, 0] + reach
             and abs(p[7] - q[7]) <= spans[a, 1] + spans[b, 1] + reach
@@ -131,24 +125,19 @@ def _gather(tables: Tables, room: Room, speeds: Any, pair_speeds: Any, time: flo
 
 
 @compiled
-def _speed(tables: Tables, speeds: Any, pair_speeds: Any, code: int) -> float:
-    return pair_speeds[~code] if code < 0 else speeds[code // len(tables.obstacles)]
-
-
-@compiled
 def _look(
     tables: Tables, room: Room, code: int, speed: float, drifts: Any, turns: Any, half: float, margin: float
 ) -> int:
     """Return what is known of a pair on a stretch of some half length, with the robots placed in its middle."""
     if code < 0:
         a, b = tables.links[tables.pairs[~code, 0]], tables.links[tables.pairs[~code, 1]]
-        p, q = room.frames[a[_STEP]], room.frames[b[_STEP]]
-        return _look_at(tables, room, a[_SHAPE], p, b[_SHAPE], q, speed, (0.0, 0.0, 0.0), speed, half, margin)
+        p, q = room.frames[a[STEP]], room.frames[b[STEP]]
+        return _look_at(tables, room, a[SHAPE], p, b[SHAPE], q, speed, (0.0, 0.0, 0.0), speed, half, margin)
     number, obstacle = code // len(tables.obstacles), code % len(tables.obstacles)
     link, drift = tables.links[number], (drifts[number, 0], drifts[number, 1], drifts[number, 2])
-    pose, other = room.frames[link[_STEP]], tables.poses[obstacle]
+    pose, other = room.frames[link[STEP]], tables.poses[obstacle]
     shape = tables.obstacles[obstacle, 0]
-    return _look_at(tables, room, link[_SHAPE], pose, shape, other, speed, drift, turns[number], half, margin)
+    return _look_at(tables, room, link[SHAPE], pose, shape, other, speed, drift, turns[number], half, margin)
 
 
 @compiled
@@ -169,11 +158,11 @@ def _look_at(
         grown = _reaches(pose_s, drift, half, beyond)
         if boxes_apart(m, a[0] + grown[0], a[1] + grown[1], a[2] + grown[2], b[0], b[1], b[2]):
             return _CLEAR
-        if tables.shapes[s, _IS_BOX] == 1 and tables.shapes[t, _IS_BOX] == 1:
+        if tables.shapes[s, IS_BOX] == 1 and tables.shapes[t, IS_BOX] == 1:
             return _TOO_NEAR if not boxes_apart(m, a[0], a[1], a[2], b[0], b[1], b[2]) else _OPEN
-        if tables.shapes[s, _IS_BOX] == 1:
+        if tables.shapes[s, IS_BOX] == 1:
             return _beside_box(tables, room, a, grown, t, m)
-        if tables.shapes[t, _IS_BOX] == 1:
+        if tables.shapes[t, IS_BOX] == 1:
             return _beside_box(tables, room, b, _reaches(pose_t, drift, half, beyond), s, inverted(m))
         if 16 * gap >= reach * reach:
             return _OPEN
@@ -207,15 +196,11 @@ def edge_collides(tables: Tables, room: Room, start: Any, delta: Any, steps: int
     """Return whether anything touches at one of the steps, both ends included, from the coarse to the fine.
 
     Args:
-        tables: The scene.
-        room: To work in.
         start, delta: (dim,) where the way begins, and where it leads from there.
         steps: Number of configurations, at least 2, evenly spaced.
     """
     last = steps - 1
-    if collides_at(tables, room, start, delta, 0.0):
-        return True
-    if collides_at(tables, room, start, delta, 1.0):
+    if collides_at(tables, room, start, delta, 0.0) or collides_at(tables, room, start, delta, 1.0):
         return True
     stride = 1
     while 2 * stride < last:

@@ -1,6 +1,7 @@
 """What Python calls: each entry takes the tables, and rows, and fills an answer for each row.
 
-MERGED: Limits of joints, and whether links stay within the boundary: every vertex, closed, missing axes unbounded.
+Limits of joints and the boundary are tested here, too: every vertex of a link, the boundary itself belongs to it, and
+axes that it does not have are unbounded.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..tables import BoundaryKind
-from .compiling import SOURCES, Room, Tables, compiled, entry, opened, room, room_for_verdicts
+from ..tables import FIRST_VERTEX, LAST_VERTEX, STEP, BoundaryKind, Tables
+from .compiling import SOURCES, Room, compiled, entry, opened, room, room_for_verdicts
 from .distances import least_distance
 from .edge_proofs import LEVELS, edge_collides, edge_is_free
 from .poses import place
@@ -21,6 +22,11 @@ Entry = Callable[..., None]
 
 # Farther than anything that is near, and nearer than the boxes of unused lanes.
 _FAR = 1e100
+# Boxes hold their meshes but for rounding; vertices are looked at where a box is nearer to the boundary than this part
+# of its size.
+_SLACK = 1e-6
+
+_NONE, _BOX = int(BoundaryKind.NONE), int(BoundaryKind.BOX)
 
 
 @compiled
@@ -64,10 +70,10 @@ def _edges_are_free(
     band: float, stretches: Any, runs: Any, pending: Any, out: Any,
 ) -> None:  # fmt: skip
     for i in range(len(start)):
+        a, d = start[i], delta[i]
         out[i] = edge_is_free(
-            tables, room, start[i], delta[i], speeds[i], drifts[i], turns[i], pair_speeds[i],
-            band, stretches, runs, pending,
-        )  # fmt: skip
+            tables, room, a, d, speeds[i], drifts[i], turns[i], pair_speeds[i], band, stretches, runs, pending
+        )
 
 
 def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
@@ -115,14 +121,6 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
 collisions, validities, distances, edges_collide, edges_are_free = _entries(SOURCES)
 
 
-_NONE, _BOX = int(BoundaryKind.NONE), int(BoundaryKind.BOX)
-_STEP, _SHAPE, _FIRST, _LAST = 0, 1, 3, 4
-
-# Boxes hold their meshes but for rounding; vertices are looked at where a box is nearer to the boundary than this part
-# of its size.
-_SLACK = 1e-6
-
-
 @compiled
 def within_limits(tables: Tables, q: Any) -> bool:
     """Return whether a configuration, (dim,), keeps the limits of its joints."""
@@ -139,7 +137,7 @@ def within_boundary(tables: Tables, room: Room) -> bool:
     if kind == _NONE:
         return True
     for link in range(len(tables.links)):
-        pose = room.frames[tables.links[link, _STEP]]
+        pose = room.frames[tables.links[link, STEP]]
         if kind == _BOX:
             if not (_box_within(tables, pose, room.spans[link]) or _vertices_within(tables, link, pose)):
                 return False
@@ -159,7 +157,7 @@ def _box_within(tables: Tables, pose: Any, span: Any) -> bool:
 
 @compiled
 def _vertices_within(tables: Tables, link: int, pose: Any) -> bool:
-    for i in range(tables.links[link, _FIRST], tables.links[link, _LAST]):
+    for i in range(tables.links[link, FIRST_VERTEX], tables.links[link, LAST_VERTEX]):
         v = tables.vertices[i]
         for k in range(3):
             x = pose[4 * k] * v[0] + pose[4 * k + 1] * v[1] + pose[4 * k + 2] * v[2] + pose[4 * k + 3]
@@ -171,7 +169,7 @@ def _vertices_within(tables: Tables, link: int, pose: Any) -> bool:
 @compiled
 def _vertices_within_ball(tables: Tables, link: int, pose: Any) -> bool:
     center, radius, axes = tables.boundary[0], tables.boundary[1, 0], int(tables.boundary[1, 1])
-    for i in range(tables.links[link, _FIRST], tables.links[link, _LAST]):
+    for i in range(tables.links[link, FIRST_VERTEX], tables.links[link, LAST_VERTEX]):
         v = tables.vertices[i]
         away = 0.0
         for k in range(axes):

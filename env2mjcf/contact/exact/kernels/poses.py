@@ -1,7 +1,4 @@
-"""Poses as twelve numbers, the upper three rows of a transform one after the other; and small vectors.
-
-MERGED: Forward kinematics of compiled code: the steps of `motions.Motions`.
-"""
+"""Poses as twelve numbers, the upper three rows of a transform; small vectors; forward kinematics."""
 
 from __future__ import annotations
 
@@ -9,7 +6,8 @@ import math
 from typing import Any
 
 from ..motions import Motion
-from .compiling import Tables, compiled, inlined
+from ..tables import Tables
+from .compiling import compiled, inlined
 
 Pose = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Vector = tuple[float, float, float]
@@ -93,7 +91,7 @@ _TURN_Z, _TURN_X, _SLIDE_Z, _BASE = int(Motion.TURN_Z), int(Motion.TURN_X), int(
 
 @inlined
 def place(tables: Tables, q: Any, frames: Any) -> None:
-    """Fill frames, (s, 12), with the world poses of all steps at a configuration, (dim,)."""
+    """Fill frames, (s, 12), with the world poses of all steps of `motions.Motions` at a configuration, (dim,)."""
     for i in range(len(tables.steps)):
         step = tables.steps[i]
         frame = frames[i]

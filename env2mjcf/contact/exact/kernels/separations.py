@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..tables import BLOCK, LANES
 from .compiling import compiled
 from .poses import Pose, cross, larger, sizes, smaller
 from .triangles import Triangle
 
-_LANES, _BLOCK = 8, 4
 _FAR = 1e300
 # Divides by what may be nothing; below any area or length that counts.
 _TINY = 1e-280
@@ -24,7 +24,7 @@ def lane_gaps(row: Any, m: Pose, c0: float, c1: float, c2: float, a0: float, a1:
     s00, s01, s02, s10, s11, s12, s20, s21, s22 = sizes(m)
     t0, t1, t2 = t0 - c0, t1 - c1, t2 - c2
     u0, u1, u2 = s00 * a0 + s10 * a1 + s20 * a2, s01 * a0 + s11 * a1 + s21 * a2, s02 * a0 + s12 * a1 + s22 * a2
-    for k in range(_LANES):
+    for k in range(LANES):
         p0, p1, p2, b0, b1, b2 = row[k], row[8 + k], row[16 + k], row[24 + k], row[32 + k], row[40 + k]
         x = r00 * p0 + r01 * p1 + r02 * p2 + t0
         y = r10 * p0 + r11 * p1 + r12 * p2 + t1
@@ -65,7 +65,7 @@ def triangle_gap(a: Triangle, row: Any) -> float:
     low1, high1 = smaller(smaller(a[1], a[4]), a[7]), larger(larger(a[1], a[4]), a[7])
     low2, high2 = smaller(smaller(a[2], a[5]), a[8]), larger(larger(a[2], a[5]), a[8])
     least = _FAR
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         p0, p1, p2 = row[k], row[4 + k], row[8 + k]
         q0, q1, q2 = row[12 + k], row[16 + k], row[20 + k]
         r0, r1, r2 = row[24 + k], row[28 + k], row[32 + k]
@@ -102,7 +102,7 @@ def triangle_distance(a: Triangle, row: Any) -> float:
     m0, m1, m2 = cross(d0, d1, d2, e0, e1, e2)
     per_m = 1 / _square(m0, m1, m2)
     least = _FAR
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         p0, p1, p2 = row[k], row[4 + k], row[8 + k]
         q0, q1, q2 = row[12 + k], row[16 + k], row[20 + k]
         r0, r1, r2 = row[24 + k], row[28 + k], row[32 + k]

@@ -1,21 +1,24 @@
-"""Whether two bodies touch: boxes first, then their trees, then whether one is inside the other.
+"""Whether anything touches in one configuration.
 
-MERGED: Whether a point lies inside a solid: how often a ray leaves it.
-
-MERGED: Whether anything touches in one configuration: a tree over the obstacles, then pairs of links.
+First links with obstacles, down a tree over those, then the pairs of links. Of two bodies the boxes are tested first,
+then their trees, then whether one is inside the other: how often a ray from a point of it leaves the other.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from ..tables import BLOCK, FIRST_POINT, IS_BOX, IS_SOLID, LANES, LAST_POINT, ROOT, SHAPE, START, STEP, TOP, Tables
 from .boxes import boxes_apart, lanes_about, lanes_near
-from .compiling import Room, Tables, compiled, compiled_strictly, inlined
+from .compiling import Room, compiled, compiled_strictly, inlined
 from .poses import Pose, Vector, inverted, larger, moved, relative, smaller
 from .triangles import box_meets, corners, placed, triangle_meets
 
-_LANES, _BLOCK = 8, 4
-_ROOT, _START, _IS_BOX, _IS_SOLID, _FIRST, _LAST = 0, 1, 2, 3, 4, 5
+_ORIENTED = 1
+
+# The ray goes up along z and leans by this much, so that it meets no edge of a mesh whose edges run along its axes.
+_LEAN_X, _LEAN_Y = 0.0123917, 0.0271813
+_TINY = 1e-290
 
 
 @inlined
@@ -26,28 +29,28 @@ def touch(tables: Tables, s: int, pose_s: Any, t: int, pose_t: Any, stack: Any) 
     if boxes_apart(m, a[0], a[1], a[2], b[0], b[1], b[2]):
         return False
     first, second = tables.shapes[s], tables.shapes[t]
-    if first[_IS_BOX] == 1 and second[_IS_BOX] == 1:
+    if first[IS_BOX] == 1 and second[IS_BOX] == 1:
         # The boxes are the bodies.
-        return (first[_IS_SOLID] > 0 or not _box_in_box(m, a, b)) and (
-            second[_IS_SOLID] > 0 or not _box_in_box(inverted(m), b, a)
+        return (first[IS_SOLID] > 0 or not _box_in_box(m, a, b)) and (
+            second[IS_SOLID] > 0 or not _box_in_box(inverted(m), b, a)
         )
-    if first[_IS_BOX] == 1 and _counts_as_solid(first, a, b):
+    if first[IS_BOX] == 1 and _counts_as_solid(first, a, b):
         crosses = box_crosses(tables, a[0], a[1], a[2], t, m, stack)
-    elif second[_IS_BOX] == 1 and _counts_as_solid(second, b, a):
+    elif second[IS_BOX] == 1 and _counts_as_solid(second, b, a):
         crosses = box_crosses(tables, b[0], b[1], b[2], s, inverted(m), stack)
     else:
         crosses = _trees_cross(tables, s, t, m, stack)
     if crosses:
         return True
-    return (second[_IS_SOLID] > 0 and _holds_any(tables, t, s, inverted(m), stack)) or (
-        first[_IS_SOLID] > 0 and _holds_any(tables, s, t, m, stack)
+    return (second[IS_SOLID] > 0 and _holds_any(tables, t, s, inverted(m), stack)) or (
+        first[IS_SOLID] > 0 and _holds_any(tables, s, t, m, stack)
     )
 
 
 @compiled
 def _counts_as_solid(shape: Any, half: Any, other: Any) -> bool:
     """Return whether a triangle in a box means contact: it is solid, or no component of the other fits into it."""
-    return shape[_IS_SOLID] > 0 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
+    return shape[IS_SOLID] > 0 or 2 * (half[0] ** 2 + half[1] ** 2 + half[2] ** 2) ** 0.5 < other[3]
 
 
 @compiled
@@ -63,14 +66,14 @@ def _box_in_box(m: Pose, a: Any, b: Any) -> bool:
 @compiled
 def box_crosses(tables: Tables, h0: float, h1: float, h2: float, t: int, m: Pose, stack: Any) -> bool:
     """Return whether a solid box with half sizes h meets any triangle of shape t, at pose m in the box's frame."""
-    stack[0] = tables.shapes[t, _START]
+    stack[0] = tables.shapes[t, START]
     count = 1
     while count > 0:
         count -= 1
         node = stack[count]
         lanes = lanes_near(tables.boxes[node], m, 0.0, 0.0, 0.0, h0, h1, h2)
         children = tables.children[node]
-        for k in range(_LANES):
+        for k in range(LANES):
             if lanes >> k & 1:
                 if children[k] >= 0:
                     stack[count] = children[k]
@@ -87,37 +90,39 @@ def _trees_cross(tables: Tables, s: int, t: int, m: Pose, stack: Any) -> bool:
     The stack holds pairs of places, node and lane in one number, whose boxes overlap; the larger box is opened.
     """
     back = inverted(m)
-    stack[0], stack[1] = tables.shapes[s, _ROOT] * _LANES, tables.shapes[t, _ROOT] * _LANES
+    stack[0], stack[1] = tables.shapes[s, ROOT] * LANES, tables.shapes[t, ROOT] * LANES
     count = 2
     while count > 0:
         count -= 2
         p, q = stack[count], stack[count + 1]
-        child_p, child_q = tables.children[p // _LANES, p % _LANES], tables.children[q // _LANES, q % _LANES]
+        child_p, child_q = tables.children[p // LANES, p % LANES], tables.children[q // LANES, q % LANES]
         if child_p < 0 and child_q < 0:
             if _leaves_cross(tables.blocks[~child_p], tables.blocks[~child_q], back):
                 return True
             continue
-        row_p, row_q = tables.boxes[p // _LANES], tables.boxes[q // _LANES]
-        i, j = p % _LANES, q % _LANES
+        row_p, row_q = tables.boxes[p // LANES], tables.boxes[q // LANES]
+        i, j = p % LANES, q % LANES
         if child_q < 0 or (child_p >= 0 and box_size(row_p, i) > box_size(row_q, j)):
-            lanes = lanes_near(
-                tables.boxes[child_p], back,
-                row_q[j], row_q[8 + j], row_q[16 + j], row_q[24 + j], row_q[32 + j], row_q[40 + j],
-            )  # fmt: skip
-            for k in range(_LANES):
+            x, y, z, a, b, c = lane_box(row_q, j)
+            lanes = lanes_near(tables.boxes[child_p], back, x, y, z, a, b, c)
+            for k in range(LANES):
                 if lanes >> k & 1:
-                    stack[count], stack[count + 1] = child_p * _LANES + k, q
+                    stack[count], stack[count + 1] = child_p * LANES + k, q
                     count += 2
         else:
-            lanes = lanes_near(
-                tables.boxes[child_q], m,
-                row_p[i], row_p[8 + i], row_p[16 + i], row_p[24 + i], row_p[32 + i], row_p[40 + i],
-            )  # fmt: skip
-            for k in range(_LANES):
+            x, y, z, a, b, c = lane_box(row_p, i)
+            lanes = lanes_near(tables.boxes[child_q], m, x, y, z, a, b, c)
+            for k in range(LANES):
                 if lanes >> k & 1:
-                    stack[count], stack[count + 1] = p, child_q * _LANES + k
+                    stack[count], stack[count + 1] = p, child_q * LANES + k
                     count += 2
     return False
+
+
+@compiled
+def lane_box(row: Any, k: int) -> tuple[float, float, float, float, float, float]:
+    """Return the centre and the half sizes of box k of a node."""
+    return row[k], row[8 + k], row[16 + k], row[24 + k], row[32 + k], row[40 + k]
 
 
 @compiled
@@ -129,7 +134,7 @@ def box_size(row: Any, k: int) -> float:
 @compiled
 def _leaves_cross(first: Any, second: Any, back: Pose) -> bool:
     """Return whether any triangle of a leaf meets one of another; `back` is the pose of the first's frame."""
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         if triangle_meets(placed(back, corners(first, k)), second):
             return True
     return False
@@ -138,18 +143,11 @@ def _leaves_cross(first: Any, second: Any, back: Pose) -> bool:
 @compiled
 def _holds_any(tables: Tables, s: int, t: int, m: Pose, stack: Any) -> bool:
     """Return whether a component of shape t, at pose m in the frame of s, lies inside s, given that none crosses."""
-    for i in range(tables.shapes[t, _FIRST], tables.shapes[t, _LAST]):
+    for i in range(tables.shapes[t, FIRST_POINT], tables.shapes[t, LAST_POINT]):
         x, y, z = moved(m, tables.points[i, 0], tables.points[i, 1], tables.points[i, 2])
         if holds(tables, s, x, y, z, stack):
             return True
     return False
-
-
-_ORIENTED = 1
-
-# The ray goes up along z and leans by this much, so that it meets no edge of a mesh whose edges run along its axes.
-_LEAN_X, _LEAN_Y = 0.0123917, 0.0271813
-_TINY = 1e-290
 
 
 @compiled
@@ -165,14 +163,14 @@ def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) 
     # The ray's foot in the plane z = 0, along its lean.
     u, v = x - _LEAN_X * z, y - _LEAN_Y * z
     winding = 0
-    stack[0] = tables.shapes[shape, _START]
+    stack[0] = tables.shapes[shape, START]
     count = 1
     while count > 0:
         count -= 1
         node = stack[count]
         lanes = _lanes_above(tables.boxes[node], u, v, z)
         children = tables.children[node]
-        for k in range(_LANES):
+        for k in range(LANES):
             if lanes >> k & 1:
                 if children[k] >= 0:
                     stack[count] = children[k]
@@ -180,14 +178,14 @@ def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) 
                 else:
                     winding += _crossings(tables.blocks[~children[k]], u, v, z)
     # Where the triangles are not wound alike, only whether they are an even number is known.
-    return winding != 0 if tables.shapes[shape, _IS_SOLID] == _ORIENTED else winding % 2 != 0
+    return winding != 0 if tables.shapes[shape, IS_SOLID] == _ORIENTED else winding % 2 != 0
 
 
 @compiled
 def _lanes_above(row: Any, u: float, v: float, z: float) -> int:
     """Return the lanes whose boxes a ray from height z up may meet, as bits."""
     lanes = 0
-    for k in range(_LANES):
+    for k in range(LANES):
         gap = abs(row[k] - _LEAN_X * row[16 + k] - u) - (row[24 + k] + _LEAN_X * row[40 + k])
         gap = larger(gap, abs(row[8 + k] - _LEAN_Y * row[16 + k] - v) - (row[32 + k] + _LEAN_Y * row[40 + k]))
         gap = larger(gap, z - (row[16 + k] + row[40 + k]))
@@ -199,11 +197,11 @@ def _lanes_above(row: Any, u: float, v: float, z: float) -> int:
 def _crossings(row: Any, u: float, v: float, z: float) -> int:
     """Return how many triangles of a leaf the ray's line leaves through above z, minus those it enters through."""
     around = 0
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         p, q, r = _sides(row, k, u, v)
         around |= (1 << k) if larger(smaller(smaller(p, q), r), -larger(larger(p, q), r)) > 0 else 0
     total = 0
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         # A leaf that is not full has its last triangle several times.
         if around >> k & 1 and not (k > 0 and _same(row, k)):
             p, q, r = _sides(row, k, u, v)
@@ -249,24 +247,21 @@ def _side(ax: float, ay: float, bx: float, by: float) -> float:
     return -area if swapped else area
 
 
-_STEP, _SHAPE, _TOP = 0, 1, 2
-
-
 @inlined
 def collides(tables: Tables, room: Room) -> bool:
     """Return whether any tested pair touches, with the robots placed in the room's frames, and measured."""
     frames, spans = room.frames, room.spans
     for link in range(len(tables.links)):
-        if tables.links[link, _TOP] >= 0 and _meets_obstacle(tables, link, room):
+        if tables.links[link, TOP] >= 0 and _meets_obstacle(tables, link, room):
             return True
     for i in range(len(tables.pairs)):
         a, b = tables.pairs[i, 0], tables.pairs[i, 1]
-        p, q = frames[tables.links[a, _STEP]], frames[tables.links[b, _STEP]]
+        p, q = frames[tables.links[a, STEP]], frames[tables.links[b, STEP]]
         if (
             abs(p[3] - q[3]) <= spans[a, 0] + spans[b, 0]
             and abs(p[7] - q[7]) <= spans[a, 1] + spans[b, 1]
             and abs(p[11] - q[11]) <= spans[a, 2] + spans[b, 2]
-            and touch(tables, tables.links[a, _SHAPE], p, tables.links[b, _SHAPE], q, room.stack)
+            and touch(tables, tables.links[a, SHAPE], p, tables.links[b, SHAPE], q, room.stack)
         ):
             return True
     return False
@@ -276,7 +271,7 @@ def collides(tables: Tables, room: Room) -> bool:
 def measure(tables: Tables, room: Room) -> None:
     """Fill the room's spans from its frames."""
     for link in range(len(tables.links)):
-        pose, half = room.frames[tables.links[link, _STEP]], tables.halves[tables.links[link, _SHAPE]]
+        pose, half = room.frames[tables.links[link, STEP]], tables.halves[tables.links[link, SHAPE]]
         for k in range(3):
             room.spans[link, k] = (
                 abs(pose[4 * k]) * half[0] + abs(pose[4 * k + 1]) * half[1] + abs(pose[4 * k + 2]) * half[2]
@@ -285,9 +280,9 @@ def measure(tables: Tables, room: Room) -> None:
 
 @inlined
 def _meets_obstacle(tables: Tables, link: int, room: Room) -> bool:
-    pose, shape = room.frames[tables.links[link, _STEP]], tables.links[link, _SHAPE]
+    pose, shape = room.frames[tables.links[link, STEP]], tables.links[link, SHAPE]
     span, stack = room.spans[link], room.top
-    stack[0] = tables.links[link, _TOP]
+    stack[0] = tables.links[link, TOP]
     count = 1
     while count > 0:
         count -= 1

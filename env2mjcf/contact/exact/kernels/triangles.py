@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..tables import BLOCK
 from .compiling import compiled
 from .poses import Pose, cross, larger, moved, smaller
-
-_BLOCK = 4
 
 Triangle = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -19,9 +18,7 @@ Triangle = tuple[float, float, float, float, float, float, float, float, float]
 @compiled
 def corners(row: Any, k: int) -> Triangle:
     """Return triangle k of a leaf, (36,)."""
-    return (
-        row[k], row[4 + k], row[8 + k], row[12 + k], row[16 + k], row[20 + k], row[24 + k], row[28 + k], row[32 + k],
-    )  # fmt: skip
+    return row[k], row[4 + k], row[8 + k], row[12 + k], row[16 + k], row[20 + k], row[24 + k], row[28 + k], row[32 + k]
 
 
 @compiled
@@ -67,7 +64,7 @@ def triangle_meets(a: Triangle, row: Any) -> bool:
     n0, n1, n2 = cross(d0, d1, d2, e0, e1, e2)
     height = a0 * n0 + a1 * n1 + a2 * n2
     crossing = 0
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         p = row[k] * n0 + row[4 + k] * n1 + row[8 + k] * n2 - height
         q = row[12 + k] * n0 + row[16 + k] * n1 + row[20 + k] * n2 - height
         r = row[24 + k] * n0 + row[28 + k] * n1 + row[32 + k] * n2 - height
@@ -76,7 +73,7 @@ def triangle_meets(a: Triangle, row: Any) -> bool:
     if crossing == 0:
         return False
     meeting = 0
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         p0, p1, p2 = row[k], row[4 + k], row[8 + k]
         q0, q1, q2 = row[12 + k], row[16 + k], row[20 + k]
         r0, r1, r2 = row[24 + k], row[28 + k], row[32 + k]
@@ -102,48 +99,39 @@ def triangle_meets(a: Triangle, row: Any) -> bool:
     meeting &= crossing
     if meeting == 0:
         return False
-    for k in range(_BLOCK):
-        if meeting >> k & 1 and not _apart_in_plane(a, corners(row, k)):
-            return True
+    for k in range(BLOCK):
+        if meeting >> k & 1:
+            b = corners(row, k)
+            if not (_beside(a, b) or _beside(b, a)):
+                return True
     return False
 
 
 @compiled
-def _apart_in_plane(a: Triangle, b: Triangle) -> bool:
-    """Return whether triangles are apart along the normal of an edge in their own plane."""
-    return _beside(a, b) or _beside(b, a)
-
-
-@compiled
 def _beside(a: Triangle, b: Triangle) -> bool:
+    """Return whether triangles are apart along the normal of an edge of the first in its own plane."""
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = a
     n0, n1, n2 = cross(b0 - a0, b1 - a1, b2 - a2, c0 - b0, c1 - b1, c2 - b2)
     for k in range(3):
         i, j = 3 * k, (3 * k + 3) % 9
         x, y, z = cross(n0, n1, n2, a[j] - a[i], a[j + 1] - a[i + 1], a[j + 2] - a[i + 2])
-        if _gap(
-            a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z, c0 * x + c1 * y + c2 * z,
-            b[0] * x + b[1] * y + b[2] * z, b[3] * x + b[4] * y + b[5] * z, b[6] * x + b[7] * y + b[8] * z,
-        ) > 0:  # fmt: skip
+        p, p2, p3 = a0 * x + a1 * y + a2 * z, b0 * x + b1 * y + b2 * z, c0 * x + c1 * y + c2 * z
+        q, q2 = b[0] * x + b[1] * y + b[2] * z, b[3] * x + b[4] * y + b[5] * z
+        if _gap(p, p2, p3, q, q2, b[6] * x + b[7] * y + b[8] * z) > 0:
             return True
     return False
 
 
 @compiled
 def box_meets(row: Any, m: Pose, h0: float, h1: float, h2: float) -> bool:
-    """Return whether a box about the origin, with half sizes h, meets any triangle of a leaf, (36,).
+    """Return whether a box about the origin, with half sizes h, meets any triangle of a leaf, (36,), at pose m.
 
     The box is solid: a triangle inside of it meets it. Axes: its sides, the triangle's normal, and the cross products
     of both (Akenine-Moeller, Fast 3D Triangle-Box Overlap Testing, 2001).
-
-    Args:
-        row: The leaf.
-        m: The pose of its frame in the box's.
-        h0, h1, h2: Half sizes.
     """
     r00, r01, r02, t0, r10, r11, r12, t1, r20, r21, r22, t2 = m
     meeting = 0
-    for k in range(_BLOCK):
+    for k in range(BLOCK):
         x, y, z = row[k], row[4 + k], row[8 + k]
         p0 = r00 * x + r01 * y + r02 * z + t0
         p1 = r10 * x + r11 * y + r12 * z + t1
