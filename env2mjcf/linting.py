@@ -90,10 +90,7 @@ def lint(
     Raises:
         ValueError: An option has a value that it cannot take.
     """
-    given = options or Options()
-    chosen = Options.from_keywords(
-        {f.name: getattr(given, f.name) for f in dataclasses.fields(given)} | {"strict": False}
-    )
+    chosen = dataclasses.replace(options or Options(), strict=False)
     files = _files(paths, chosen)
     results: list[LintResult] = []
     seen: set[Diagnostic] = set()

@@ -9,6 +9,7 @@ from ..diagnostics import DiagnosticLog
 from ..kinematics.tree import build_tree
 from ..model.environment import Environment, MultiBody
 from ..options import Options
+from .scenery import gravity_of_file
 
 # MuJoCo's XML parser refuses the 500th element within others: <mujoco> and <worldbody> are around the bodies, and
 # geoms in the last.
@@ -53,7 +54,8 @@ def report_unused(environment: Environment, options: Options, log: DiagnosticLog
         log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
     attributes = dict(environment.attributes)
     for name in _PHYSICS:
-        if name in attributes:
+        followed = name == "gravity" and options.gravity is None and any(gravity_of_file(environment) or ())
+        if name in attributes and not followed:
             log.info(
                 "MJC412",
                 name,

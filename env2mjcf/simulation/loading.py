@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Unpack
 
 from ..contact.exact.engine import require
 from ..contact.types import Contact
 from ..diagnostics import DiagnosticLog
 from ..model.environment import Dialect
-from ..options import Options, PathArgument
+from ..options import OptionKeywords, Options, PathArgument
 from ..pipeline import Compiled, compile_scene, recompile
 from .mujoco_model import load_model
 from .scene import Scene
 
 
-def load(path: PathArgument, **options: Any) -> Scene:
+def load(path: PathArgument, **options: Unpack[OptionKeywords]) -> Scene:
     """Load a scene into MuJoCo; nothing is written.
 
     Args:
