@@ -171,7 +171,7 @@ def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
         elif kind is Kind.MESH:
             _lint_mesh(Path(path), options, log)
         else:
-            log.info("ENV132", path, f"{path} is XML, but no scene and no robot; skipped")
+            log.info("ENV132", path, f"{path} is XML, but neither a scene nor a robot; skipped")
     except Env2MjcfError as error:
         return error.diagnostics
     return tuple(log)
@@ -186,16 +186,20 @@ def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
             log = DiagnosticLog()
             _lint_robot(path, options, log)
             return tuple(log)
-        return prepare(path, options, DiagnosticLog()).diagnostics
+        log = DiagnosticLog()
+        environment = read_scene(path, options, log)
+    except Env2MjcfError as error:
+        return error.diagnostics
+    try:
+        return prepare(environment, options, log).diagnostics
     except GeometryError as error:
         # The first bad mesh ends the loading, so that each has to be looked at alone.
-        return [*error.diagnostics[:-1], *_lint_meshes(path, options, error)]
+        return [*error.diagnostics[:-1], *_lint_meshes(environment, options, error)]
     except Env2MjcfError as error:
         return error.diagnostics
 
 
-def _lint_meshes(path: str, options: Options, error: GeometryError) -> list[Diagnostic]:
-    environment = read_scene(path, options, DiagnosticLog())
+def _lint_meshes(environment: Environment, options: Options, error: GeometryError) -> list[Diagnostic]:
     bodies = {b.filename: b for m in environment.multibodies for b in m.bodies}
     found: list[Diagnostic] = []
     for body in bodies.values():

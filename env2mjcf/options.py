@@ -41,8 +41,8 @@ class Options:
         collision: How meshes become convex collision shapes.
         primitives: Write exact boxes as box geoms.
         self_collision: Test links of one robot against each other; unless given, what a problem XML says, else True.
-        adjacent_links: Links within this many connections of each other are not tested; unless given, what a problem XML
-            says, else 1.
+        adjacent_links: Links within this many connections of each other are not tested; unless given, what a problem
+            XML says, else 1.
         inter_robot: Test links of different robots against each other.
         exclude_pairs: Pairs of body names that are not tested.
         exclude_rest_contacts: Do not test pairs that touch at home.

@@ -17,8 +17,8 @@ from tyro.conf import Positional
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .meter import Meter
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..batch import BatchResult

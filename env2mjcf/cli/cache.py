@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 from tyro.conf import Positional
 
 from .arguments import Output, OutputFlags
-from .printing import one_line, print_json
 from .program import BAD_INPUT, DONE
+from .terminal import one_line, print_json
 
 
 @dataclass(frozen=True, slots=True)

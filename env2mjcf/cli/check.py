@@ -28,8 +28,8 @@ from .judgements import (
     pose_summary,
     verdict_lines,
 )
-from .printing import print_diagnostics, print_json, print_parts, working
 from .program import BAD_INPUT, DONE, FINDING
+from .terminal import print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..companions.records import Configurations, Graph

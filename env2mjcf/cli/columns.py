@@ -13,7 +13,7 @@ from rich.text import Text
 
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
-from .printing import one_line
+from .terminal import one_line
 
 if TYPE_CHECKING:
     from ..report import Report

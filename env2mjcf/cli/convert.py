@@ -11,11 +11,10 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from ..model.names import file_stem
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, working
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, working
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +44,7 @@ class Convert:
     def run(self) -> int:
         """Convert and print where the MJCF lies."""
         from ..conversion import convert
+        from ..model.names import file_stem
 
         if self.out is not None and self.output_path is not None:
             raise ValueError(f"the output is given twice, as {self.out!r} and as --out {self.output_path!r}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.text import Text
 from tqdm import tqdm
 
-from .printing import one_line, plain
+from .terminal import one_line, plain
 
 if TYPE_CHECKING:
     from ..companions.records import Graph, Poses

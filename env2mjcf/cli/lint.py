@@ -9,14 +9,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 from tyro.conf import Positional
 
 from ..errors import Diagnostic, Severity
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
-from .printing import one_line, print_diagnostic, print_json, printable
 from .program import BAD_INPUT, DONE, FINDING
+from .terminal import console_on, one_line, print_diagnostic, print_json, printable
 
 if TYPE_CHECKING:
     from ..linting import LintResult
@@ -106,7 +105,7 @@ def _github_property(text: str) -> str:
 
 
 def _print_text(results: Sequence[LintResult]) -> None:
-    console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    console = console_on(sys.stdout, soft_wrap=True)
     for result in results:
         for diagnostic in result.diagnostics:
             print_diagnostic(console, diagnostic, result.path)

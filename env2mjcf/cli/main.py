@@ -9,13 +9,15 @@ import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from ..errors import Env2MjcfError, did_you_mean
-from ..view.offscreen import RenderError, refuse_unknown
 from . import program
-from .arguments import Verb, parse
-from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
 from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
+from .terminal import one_line, print_diagnostics, print_json, printable, tame_libraries
+
+if TYPE_CHECKING:
+    from .arguments import Verb
 
 # Each verb: its module here, its class there, what it does.
 VERBS = {
@@ -100,11 +102,17 @@ def _dispatch(words: list[str]) -> int:
         what = f"there is no verb {name!r}{f'; {guess}' if guess else ''}" if name else "a verb is missing"
         _complain(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
         return WRONG_USAGE
+    # Imported here, because help and version need neither tyro nor numpy.
+    from .arguments import parse
+
     module, class_name, _ = VERBS[name]
     try:
         verb = parse(getattr(import_module(f".{module}", __package__), class_name), name, words[1:])
     except SystemExit as ended:  # tyro has printed its help, or what is wrong
         return ended.code if isinstance(ended.code, int) else WRONG_USAGE
+    except ValueError as error:  # options check themselves
+        _complain(f"{name}: {error}")
+        return WRONG_USAGE
     return _run(name, verb)
 
 
@@ -119,6 +127,8 @@ def _version() -> str:
 
 
 def _run(name: str, verb: Verb) -> int:
+    from ..view.offscreen import RenderError, refuse_unknown
+
     try:
         refuse_unknown()  # or whatever imports MuJoCo would fail
         return verb.run()

@@ -9,9 +9,10 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.status import Status
 from tqdm import tqdm
+
+from .terminal import console_on
 
 if TYPE_CHECKING:
     from ..planning.result import Progress
@@ -69,7 +70,7 @@ class PlanningMeter:
 
     def __enter__(self) -> PlanningMeter:
         if sys.stderr.isatty():
-            console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False)
+            console = console_on(sys.stderr)
             self._status = console.status("planning")
             self._status.start()
         return self

@@ -13,14 +13,12 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..companions.configurations import refuse_without_freedom
 from ..diagnostics import DiagnosticLog
-from ..formats.path import begins_as_path
 from ..options import Options, PathArgument
 from ..system.files import refuse_foreign, refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
 from .program import DONE, FINDING
+from .terminal import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..planning.result import Plan as Result
@@ -78,8 +76,9 @@ class Plan:
 
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
-        from ..planning.plan_tasks import plan_through
+        from ..formats.path import begins_as_path
         from ..planning.planners import installed
+        from ..planning.route import plan_through
         from ..simulation.loading import load
 
         # Before anything is loaded and looked at, which may take a minute.
@@ -121,6 +120,8 @@ class Plan:
             FormatError: Nothing in the scene moves, there is no task, or it has no goal.
             ValueError: There are not so many.
         """
+        from ..companions.configurations import refuse_without_freedom
+
         refuse_without_freedom(scene, self.scene, log)
         tasks = scene.queries
         if not tasks:
@@ -173,7 +174,7 @@ def dense(scene: Scene, result: Result) -> np.ndarray:
 
 def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
     """Return which configurations of the query are not valid, and why; None if all are."""
-    from ..planning.plan_tasks import names_of
+    from ..planning.route import names_of
     from ..simulation.verdicts import Judge
 
     judge = Judge(scene, query.q, names_of(len(query.q)))

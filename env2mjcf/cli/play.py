@@ -18,8 +18,8 @@ from ..diagnostics import DiagnosticLog
 from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..contact.types import Contact

@@ -14,8 +14,8 @@ from ..diagnostics import DiagnosticLog
 from ..limits import LARGEST, Limits
 from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
-from .printing import one_line, print_diagnostics, print_json, print_parts
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..model.environment import Boundary, Environment

@@ -17,8 +17,8 @@ from ..diagnostics import DiagnosticLog
 from ..options import Options, PathArgument
 from . import program
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, working
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, working
 
 if TYPE_CHECKING:
     from ..kinematics.transforms import Array

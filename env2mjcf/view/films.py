@@ -24,7 +24,7 @@ from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.files import output
-from .framing import Camera, Viewpoint
+from .cameras import Camera, Viewpoint
 from .marks import TRAIL, Polyline
 from .offscreen import RenderError, read_exactly
 from .pictures import touched, trail_marks

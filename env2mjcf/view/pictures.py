@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..contact.types import Contact
 from ..simulation.scene import Scene
 from ..system.files import output
-from .framing import Camera, Viewpoint
+from .cameras import Camera, Viewpoint
 from .marks import BAD, Arrows, Mark, Points, Polyline
 from .offscreen import RenderError, read_exactly
 from .shots import Frame, Shot, checked_size, taken

@@ -21,7 +21,7 @@ from ..kinematics.tree import DofKind
 from ..mjcf.scenery import boundary_lines
 from ..options import whole
 from ..simulation.scene import Scene
-from .framing import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
+from .cameras import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
 from .offscreen import RenderError, drawn
 

@@ -16,7 +16,7 @@ from ...geometry.assembly import Assembly, Part
 from ...kinematics.transforms import Array, quaternion_from_matrix
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
-from ..framing import FIELD_OF_VIEW, fitted, named_direction
+from ..cameras import FIELD_OF_VIEW, fitted, named_direction
 
 if TYPE_CHECKING:
     import viser
