@@ -316,9 +316,9 @@ class Environment:
         comments: All comment lines.
         directory: Folder that mesh files are relative to.
         path: The file, as it was named by the caller.
-        xml: Whether the file that describes the environment is XML.
         sources: All files that it was read from, robots and queries, too; what is written replaces none of them.
         diagnostics: What the readers found.
+        xml: Whether the file that describes the environment is XML.
     """
 
     name: str
@@ -334,9 +334,9 @@ class Environment:
     comments: tuple[Comment, ...] = field(default=(), compare=False, repr=False)
     directory: Path = field(default=Path(), compare=False)
     path: str = field(default="", compare=False)
-    xml: bool = field(default=False, compare=False)
     sources: tuple[str, ...] = field(default=(), compare=False, repr=False)
     diagnostics: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+    xml: bool = field(default=False, compare=False)
 
     @property
     def robots(self) -> tuple[MultiBody, ...]:
