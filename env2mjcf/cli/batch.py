@@ -49,8 +49,6 @@ class Batch:
         file_units: Numbers are the scene file's own (turns or fractions of pi, and its lengths).
         threads: Number of threads, if not all cores.
         dask: Address of a Dask scheduler whose workers do the work.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]

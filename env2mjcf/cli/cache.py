@@ -31,7 +31,6 @@ class Cache:
 
     Attributes:
         action: What to do.
-        output: How to report.
     """
 
     action: Annotated[Literal["info", "clear", "warm"], Positional]

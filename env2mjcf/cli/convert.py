@@ -31,8 +31,6 @@ class Convert:
         scene: An env file, an XML environment or a problem XML.
         out: The folder to write to, or a .xml file in one. Without it: <scene>_mjcf in the current folder.
         output_path: The same, as a flag.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]

@@ -39,8 +39,6 @@ class Info:
         scene: An env file, an XML environment or a problem XML.
         pairs: List every pair of bodies that is tested, and how often it touches in sampled configurations.
         samples: Number of configurations that --pairs samples.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]

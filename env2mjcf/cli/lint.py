@@ -40,8 +40,6 @@ class Lint:
     Attributes:
         paths: Folders, scenes, robot files or meshes.
         github: Print GitHub annotations.
-        output: How to report.
-        options: What may be chosen.
     """
 
     paths: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH [PATH ...]"), Positional]

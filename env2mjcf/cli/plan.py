@@ -16,9 +16,9 @@ from tyro.conf import Positional
 from ..diagnostics import DiagnosticLog
 from ..options import Options, PathArgument
 from ..system.files import refuse_foreign, refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE, FINDING
-from .terminal import one_line, print_diagnostics, print_json, print_parts, working
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..planning.result import Plan as Result
@@ -58,8 +58,6 @@ class Plan:
         corners: Write just the corners of the path.
         shorten: Make the path shorter.
         task: Which task of the query, counted from 1, where there are several.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -79,7 +77,6 @@ class Plan:
         from ..formats.path import begins_as_path
         from ..planning.planners import installed
         from ..planning.route import plan_through
-        from ..simulation.loading import load
 
         # Before anything is loaded and looked at, which may take a minute.
         installed(self.planner)
@@ -90,10 +87,7 @@ class Plan:
                 refuse_foreign(
                     file, "CFG553", "path file", lambda data: begins_as_path(data.decode("utf-8", "replace"))
                 )
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, self.options)
         query = self._query(scene, log)
         print_diagnostics(log, self.output.verbose)
         if (wrong := _wrong(scene, query)) is not None:

@@ -13,9 +13,9 @@ from tyro.conf import Positional
 from ..diagnostics import DiagnosticLog
 from ..options import Options
 from ..system.files import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
+from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
-from .terminal import one_line, print_diagnostics, print_json, print_parts, working
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..kinematics.transforms import Array
@@ -46,8 +46,6 @@ class Render:
         trail: A path file: a line, and robots nearly transparent along it.
         size: Width and height in pixels.
         see_through: Draw obstacles transparent, or --no-see-through: never.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -64,17 +62,13 @@ class Render:
 
     def run(self) -> int:
         """Draw, and say where the picture is."""
-        from ..simulation.loading import load
         from ..view.pictures import picture
 
         if not self.out.lower().endswith(".png"):
             raise ValueError(f"--out is {self.out}; expected a file that ends in .png")
         camera, size = camera_of(self.camera), size_of(self.size)
         refuse_unwritable(self.out, "CFG552")
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, self.options)
         trail = None if self.trail is None else self._trail(scene, log)
         print_diagnostics(log, self.output.verbose)
         rows = self._rows(scene)

@@ -12,34 +12,22 @@ import logging
 import math
 import re
 import sys
-import unicodedata
 import warnings
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..errors import Diagnostic, Severity
+from ..diagnostics import DiagnosticLog
+from ..errors import Diagnostic, Severity, is_tricky, one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from ..options import Options
+    from ..simulation.scene import Scene
+
 _COLOURS = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity.INFO: "bold cyan"}
-
-# Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.
-_TRICKY = ("Cc", "Cf", "Cs", "Zl", "Zp")
-
-
-def printable(text: str) -> str:
-    """Return text with control characters escaped; line feeds and tabs stay."""
-    return "".join(c if c in "\n\t" else one_line(c) for c in text)
-
-
-def one_line(text: str) -> str:
-    """Return text with every control character escaped."""
-    return "".join(
-        c.encode("unicode_escape").decode("ascii") if unicodedata.category(c) in _TRICKY else c for c in text
-    )
 
 
 def format_diagnostic(diagnostic: Diagnostic) -> str:
@@ -47,7 +35,7 @@ def format_diagnostic(diagnostic: Diagnostic) -> str:
     span = diagnostic.span
     if span is not None:
         # One character stands for one, so that the caret stays under its column.
-        text = "".join("\ufffd" if c != "\t" and unicodedata.category(c) in _TRICKY else c for c in span.text)
+        text = "".join("\ufffd" if c != "\t" and is_tricky(c) else c for c in span.text)
         span = dataclasses.replace(span, path=one_line(span.path), text=text)
     safe = dataclasses.replace(
         diagnostic, message=printable(diagnostic.message), hint=printable(diagnostic.hint), span=span
@@ -104,6 +92,15 @@ def working(what: str) -> Generator[None]:
 
     with console_on(sys.stderr).status(Text(one_line(what), "dim")):
         yield
+
+
+def loaded(path: str, options: Options) -> tuple[Scene, DiagnosticLog]:
+    """Load a scene, and say so on a terminal; return a log with its findings, too."""
+    from ..simulation.loading import prepare
+
+    log = DiagnosticLog(options.strict)
+    with working(f"loading {path}"):
+        return prepare(path, options, log), log
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:

@@ -50,7 +50,6 @@ class Translate:
         box: A boundary for a scene that has none, in file units; dialects C to E must have one.
         strict: Refuse whatever would be lost.
         limits: Bounds on hostile input.
-        output: How to report.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]

@@ -16,9 +16,9 @@ from tyro.conf import Positional
 from ..diagnostics import DiagnosticLog
 from ..options import Options, PathArgument
 from . import program
-from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE
-from .terminal import one_line, print_diagnostics, print_json, working
+from .terminal import loaded, one_line, print_diagnostics, print_json
 
 if TYPE_CHECKING:
     from ..kinematics.transforms import Array
@@ -44,8 +44,6 @@ class View:
         port: Where the page is served; a free port from 8080 on if it is not given.
         browser: Open the page in a browser.
         native: Open MuJoCo's own viewer instead of the page.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -67,12 +65,7 @@ class View:
                 raise ValueError("--native plays no path: leave one of --native and --path out")
         else:
             server.require()
-        from ..simulation.loading import load
-
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, self.options)
         path = None if self.path is None else self._path(scene, log)
         print_diagnostics(log, self.output.verbose)
         if self.native:

@@ -1,7 +1,4 @@
-"""What planning ends with.
-
-MERGED: How long planning may take, and who wants to know how far it is.
-"""
+"""What planning ends with, how far it is, and how long it may take."""
 
 from __future__ import annotations
 
@@ -26,7 +23,7 @@ class Plan:
             degrees of freedom. Not solved: the best approach, from the start to what came nearest to the goal.
         certified: (k - 1,) for each edge, whether it is proved that nothing touches on it (`Scene.edge_is_free`).
         dense: (k - 1,) for each edge, whether everything on it is valid at steps of `fine_step`.
-        planner: Who found it, or looked for it; several where legs differ.
+        planner: The planner that found it, or looked for it; several where legs differ.
         seconds: How long it took, shortening and proofs included.
         checks: How many configurations were looked at; proofs, which look at distances, are not counted.
         length: Of the path: metres of a base, and how far a point of a robot moves, at most, by every other degree of
@@ -81,7 +78,7 @@ class Progress:
 _INTERVAL = 0.2
 
 
-class Watch:
+class Timekeeper:
     """Tells planners when to stop, reports now and then, and adds up what was checked.
 
     Args:

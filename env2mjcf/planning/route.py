@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
@@ -17,9 +16,9 @@ from ..simulation.scene import Scene
 from ..simulation.verdicts import Judge
 from ..system.locks import Lock
 from .planner_space import PlanningSpace
-from .planners import known
-from .result import Plan, Progress, Watch
-from .segment import Leg, LegResult
+from .planners import installed
+from .result import Plan, Progress, Timekeeper
+from .segment import Segment, SegmentPlanner
 
 # OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
 # depend on which of them is quicker.
@@ -62,9 +61,9 @@ def plan(
         progress: Called a few times a second.
 
     Raises:
-        TypeError: planner is no name, or robot, time, seed or resolution no number of the right kind.
+        TypeError: planner is not a name, or robot, time, seed or resolution not a number of the right kind.
         FormatError: The file's PositionRes is too small to plan with.
-        ValueError: Start or goal is no configuration, or not valid with the other robots as they are in `start` (the
+        ValueError: Start or goal is not a configuration, or not valid with the other robots as they are in `start` (the
             message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
             resolution is out of range.
     """
@@ -91,29 +90,28 @@ def plan_through(
 
     With `robot`, the others stay as they are in the first configuration.
     """
-    rows, name = scene.space.check(q), known(planner)
+    rows, name = scene.space.check(q), installed(planner)
     _refuse(scene, rows, robot, time, seed)
     step = _step(scene, resolution)
     columns = _columns(scene, robot)
     rows = _others_as_at_start(rows, columns)
     _refuse_invalid(scene, rows)
-    if find_spec("ompl") is None:
-        raise ValueError(f"planner {name} needs one more package: pip install 'env2mjcf[planning]'")
     scene.warm_up()
     space = PlanningSpace(scene, rows, columns)
     with _one_at_a_time:
-        watch = Watch(time, len(rows) - 1, progress)
-        began, results = clock.perf_counter(), list[LegResult]()
+        watch = Timekeeper(time, len(rows) - 1, progress)
+        began, results = clock.perf_counter(), list[Segment]()
         for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
             watch.leg = number
-            leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
-            results.append(leg.plan(start, goal))
+            seeds = np.random.SeedSequence((seed, number))
+            segment = SegmentPlanner(scene, space, name, step, seeds, watch, shorten)
+            results.append(segment.plan(start, goal))
             if not results[-1].solved:
                 break
         return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
 
 
-def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:
+def _joined(space: PlanningSpace, legs: list[Segment], seconds: float, checks: int, seed: int) -> Plan:
     path = np.concatenate([legs[0].path[:1], *(leg.path[1:] for leg in legs)])
     return Plan(
         solved=legs[-1].solved,
