@@ -1,7 +1,4 @@
-"""Bounds the work on one mesh: the parts of a hostile one lie so that everything must be compared with everything.
-
-MERGED: Tells which mesh it is that takes too much work.
-"""
+"""Bounds on hostile input, and on the work that one mesh may take: its parts may lie so that each meets every other."""
 
 from __future__ import annotations
 
@@ -18,11 +15,7 @@ COSTLY = 10
 
 
 class TooMuchWorkError(Exception):
-    """More steps were asked for than are allowed.
-
-    Args:
-        part: Index of the part of the mesh that they were asked for, where it is one.
-    """
+    """More steps were asked for than are allowed; `part` is the index of the part of the mesh, where it is one."""
 
     def __init__(self, part: int = 0) -> None:
         super().__init__(part)
@@ -53,29 +46,20 @@ class Work:
 
 @contextmanager
 def bounded(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None) -> Generator[None]:
-    """Refuse a mesh while which is worked on more steps are asked for than `limits.mesh_work`.
-
-    Args:
-        limits: Bounds on hostile input.
-        log: Where findings go.
-        subject: What the mesh is called.
-        span: Where it is named.
+    """Refuse a mesh, named at `span`, that takes more steps to work on than `limits.mesh_work`.
 
     Raises:
-        GeometryError: More are asked for.
+        GeometryError: It does.
     """
     try:
         yield
     except TooMuchWorkError:
-        log.fail(
-            "GEO273",
-            subject,
+        message = (
             f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its "
-            "parts would have to be compared",
-            hint="remove parts that overlap, choose collision='hull' (--collision hull), or "
-            + Limits.hint("mesh_work"),
-            span=span,
+            "parts would have to be compared"
         )
+        hint = f"remove parts that overlap, choose collision='hull' (--collision hull), or {Limits.hint('mesh_work')}"
+        log.fail("GEO273", subject, message, hint=hint, span=span)
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,10 +132,9 @@ def _search(folder: str) -> Iterator[str]:
 
 
 def _leads_out(path: str) -> Diagnostic:
-    return Diagnostic(
-        "ENV152", Severity.ERROR, path, f"{path} is a link that leads out of what is searched, and is not read",
-        "name its folder, too, or allow it with allow_outside=True (--allow-outside)",
-    )  # fmt: skip
+    message = f"{path} is a link that leads out of what is searched, and is not read"
+    hint = "name its folder, too, or allow it with allow_outside=True (--allow-outside)"
+    return Diagnostic("ENV152", Severity.ERROR, path, message, hint)
 
 
 def _kind(path: str) -> Kind:

@@ -169,7 +169,7 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
 _OF_THE_FILE = ("self_collision", "adjacent_links", "gravity")
 
 
-def _checked(name: str, value: Any) -> Any:
+def _checked(name: str, given: object) -> object:
     """Return the value of an option, lists as tuples.
 
     Raises:
@@ -177,12 +177,13 @@ def _checked(name: str, value: Any) -> Any:
         ValueError: It is not one that the option can take.
     """
     if name in _CHOICES:
-        return _one_of(name, value, _CHOICES[name])
-    if name == "query" or (value is None and name in _OF_THE_FILE):
-        return value
+        return _one_of(name, given, _CHOICES[name])
+    if name == "query" or (given is None and name in _OF_THE_FILE):
+        return given
     kind, expected = _KINDS.get(name, (bool, "True or False"))
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise TypeError(f"{name}={value!r}; expected {expected}")
+    if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
+        raise TypeError(f"{name}={given!r}; expected {expected}")
+    value: Any = given
     if name in ("robots", "mesh_dirs"):
         return (value,) if isinstance(value, (str, PathLike)) else tuple(value)
     if name == "exclude_pairs":

@@ -15,10 +15,10 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..options import Options
-from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .arguments import OptionFlags, Output, OutputFlags
 from .meter import Meter
 from .program import DONE
-from .terminal import one_line, print_diagnostics, print_json, print_parts, working
+from .terminal import counted, loaded, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..batch import BatchResult
@@ -64,12 +64,10 @@ class Batch:
     def run(self) -> int:
         """Write the verdicts, and print how many there are of each kind."""
         from ..batch import run
-        from ..simulation.loading import load
 
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"--threads is {self.threads}; expected at least 1")
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
+        scene, _ = loaded(self.scene, self.options)
         print_diagnostics(scene.diagnostics, self.output.verbose)
         with _executor(self.dask) as executor, Meter() as meter:
             result = run(
@@ -116,5 +114,6 @@ def _executor(address: str | None) -> Generator[Executor | None]:
 def _summary(result: BatchResult) -> Text:
     counts = ", ".join(f"{n} {what}" for what, n in result.counts.items())
     least = "" if result.least is None else f"; least clearance {result.least:.6g} m"
-    rows = f"{result.rows} configuration{'' if result.rows == 1 else 's'}"
-    return Text(f"{rows}: {counts}{least}; written to {one_line(str(result.output))}", "bold")
+    return Text(
+        f"{counted(result.rows, 'configuration')}: {counts}{least}; written to {one_line(str(result.output))}", "bold"
+    )

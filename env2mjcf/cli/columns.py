@@ -100,9 +100,9 @@ def _robot(number: int, robot: RobotSummary) -> Iterator[RenderableType]:
         return
     table = _table("", "unit", "limits in file", "home", "limits in rad, m", "home", right=(3, 5))
     for dof in robot.dofs:
-        unit, home = _UNITS[dof.unit], f"{dof.home:.6g}"
-        table.add_row(*_cells(dof.name, unit, _limits(dof, dof.lower, dof.upper), home,
-                              _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"))  # fmt: skip
+        of_file = _limits(dof, dof.lower, dof.upper), f"{dof.home:.6g}"
+        in_si = _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"
+        table.add_row(*_cells(dof.name, _UNITS[dof.unit], *of_file, *in_si))
     yield _indented(table)
 
 

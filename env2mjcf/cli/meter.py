@@ -1,7 +1,4 @@
-"""How far a long job is, and how quick: a bar on a terminal, now and then a line in a log.
-
-MERGED: How far planning is: a line on a terminal, now and then one in a log.
-"""
+"""How far a long job is: a bar or a line on a terminal, now and then a line in a log."""
 
 from __future__ import annotations
 

@@ -93,10 +93,8 @@ class Play:
             )  # fmt: skip
         if self.output.json:
             touching = [sorted({(c.link, c.other) for c in found}) for found in made.touching]
-            print_json(
-                {"film": self.out, "pictures": len(made.q), "fps": made.fps, "configurations": made.q,
-                 "touching": touching, "diagnostics": tuple(log)}
-            )  # fmt: skip
+            facts = {"film": self.out, "pictures": len(made.q), "fps": made.fps, "configurations": made.q}
+            print_json({**facts, "touching": touching, "diagnostics": tuple(log)})
         else:
             print_parts(_lines(made))
         return DONE

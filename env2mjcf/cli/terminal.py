@@ -64,6 +64,11 @@ def _without_place(message: Warning | str, category: type[Warning], *_: object) 
     return f"{category.__name__}: {message}"
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number of things, in the plural where there is not one."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def print_parts(parts: Iterable[RenderableType]) -> None:
     """Print results: in colour and as wide as the terminal, or plain, never folded and without trailing blanks."""
     on_terminal = sys.stdout.isatty()

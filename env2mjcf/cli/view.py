@@ -75,12 +75,12 @@ class View:
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
         from ..companions.configurations import of_file
-        from ..view.web.playback import doubts
+        from ..view.web.playback import report_doubtful
 
         found = of_file(scene, str(self.path), False, self.options.limits, log)
         if found.graph is not None and found.graph.kind != "path":
             raise ValueError(f"{self.path} is a {found.graph.kind}; --path plays paths")
-        doubts(scene, found.q, str(self.path), log)
+        report_doubtful(scene, found.q, str(self.path), log)
         return found.q
 
     def _serve(self, scene: Scene, path: Array | None, log: DiagnosticLog) -> int:

@@ -68,6 +68,7 @@ class Run(Protocol):
 
     def solve(self, stop: Callable[[], bool]) -> bool:
         """Plan until there is a solution, or until it is to stop; return whether there is one."""
+        ...
 
     def path(self) -> Array | None:
         """Return the solution, or else the way to what came nearest to the goal, (k, d); None without any."""

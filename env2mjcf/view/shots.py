@@ -76,7 +76,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Choice:
     """What the process that draws has chosen.
 
     Attributes:
@@ -92,7 +92,7 @@ def checked_size(size: object, least: int = 1) -> tuple[int, int]:
     """Return the width and height of a picture in pixels.
 
     Raises:
-        TypeError: It is no pair of whole numbers.
+        TypeError: It is not a pair of whole numbers.
         ValueError: One of them is out of range.
     """
     pair: tuple[object, ...] = tuple(size) if isinstance(size, Iterable) and not isinstance(size, str) else ()
@@ -107,7 +107,7 @@ def checked_size(size: object, least: int = 1) -> tuple[int, int]:
 
 
 @contextmanager
-def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
+def taken(shot: Shot) -> Generator[tuple[Choice, IO[bytes]]]:
     """Draw a shot in a process of its own.
 
     Yields:
@@ -125,7 +125,7 @@ def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
         model = Path(folder) / "scene.mjb"
         _save(shot.scene.model, model)
         with drawn(_request(shot, views, points, model)) as (head, stream):
-            yield Answer(views[head["camera"]], head["see_through"]), stream
+            yield Choice(views[head["camera"]], head["see_through"]), stream
 
 
 def _save(model: mujoco.MjModel, file: Path) -> None:
