@@ -1,4 +1,4 @@
-"""Lists everything doubtful in scenes, robots and meshes, past the first error."""
+"""Everything doubtful in scenes, robots and meshes, also after the first error."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def _xml_kind(path: str) -> Kind:
         with open_regular(path) as file:
             start = file.read(_SNIFFED_BYTES)
     except OSError:
-        return Kind.SCENE  # whose reader says what is wrong
+        return Kind.SCENE  # its reader says what is wrong
     root = _ROOT_TAG.match(start.removeprefix(b"\xef\xbb\xbf"))
     tag = root.group(1).decode("ascii", "replace").lower() if root else ""
     if tag in _SCENE_TAGS:

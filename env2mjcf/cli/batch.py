@@ -114,6 +114,5 @@ def _executor(address: str | None) -> Generator[Executor | None]:
 def _summary(result: BatchResult) -> Text:
     counts = ", ".join(f"{n} {what}" for what, n in result.counts.items())
     least = "" if result.least is None else f"; least clearance {result.least:.6g} m"
-    return Text(
-        f"{counted(result.rows, 'configuration')}: {counts}{least}; written to {one_line(str(result.output))}", "bold"
-    )
+    rows, written = counted(result.rows, "configuration"), one_line(str(result.output))
+    return Text(f"{rows}: {counts}{least}; written to {written}", "bold")

@@ -118,10 +118,10 @@ def _semantics(scene: SceneSummary) -> str:
     apart = scene.readings
     if apart is None:
         return f"the {scene.semantics}'s"
-    whose = f"the {scene.semantics}'s; the {apart.other}'s reading"
+    reading = f"the {scene.semantics}'s; the {apart.other}'s reading"
     if apart.distance == 0:
-        return f"{whose} puts every link at the same place at home"
-    return f"{whose} puts links up to {apart.distance:.6g} m ({one_line(apart.link)}) elsewhere at home"
+        return f"{reading} puts every link at the same place at home"
+    return f"{reading} puts links up to {apart.distance:.6g} m ({one_line(apart.link)}) elsewhere at home"
 
 
 def _boundary(boundary: Boundary | None) -> str:

@@ -64,7 +64,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
-    program.end_tidily()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         tame_libraries()  # the process is the program's own
@@ -113,17 +112,18 @@ def _dispatch(words: list[str]) -> int:
     except ValueError as error:  # options check themselves
         _complain(f"{name}: {error}")
         return WRONG_USAGE
+    import_module("numpy")  # all verbs need it, and where a signal interrupts its import, another error may come of it
+    program.end_tidily()
     return _run(name, verb)
 
 
 def _version() -> str:
-    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import PackageNotFoundError, version
 
     try:
-        from .. import __version__
+        return version("env2mjcf")
     except PackageNotFoundError:
         return "a checkout that is not installed"
-    return __version__
 
 
 def _run(name: str, verb: Verb) -> int:

@@ -50,7 +50,7 @@ class Plan:
     Attributes:
         scene: An env file, an XML environment or a problem XML.
         out: The path file to write; none is written without.
-        planner: Who plans.
+        planner: Which planner; see above.
         time: Seconds after which to give up.
         seed: Of the random numbers; equal seeds give equal paths, unless time runs out.
         resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner;
@@ -135,10 +135,8 @@ class Plan:
 
         if self.out is None:
             return None
-        out = Path(self.out)
-        if not result.solved:
-            out = _approach(out)
-        q = result.path if self.corners else dense(scene, result)
+        out = Path(self.out) if result.solved else _approach(Path(self.out))
+        q = result.path if self.corners else result.steps(scene)
         return write_path(scene, q, out, robot)
 
     def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
@@ -157,15 +155,6 @@ def _approach(out: Path) -> Path:
     return out.with_name(f"{out.stem}.approach.path")
 
 
-def dense(scene: Scene, result: Result) -> np.ndarray:
-    """Return configurations on the path no farther apart than its resolution, corners included, (n, dim)."""
-    rows = [result.path[:1]]
-    for a, b in zip(result.path[:-1], result.path[1:], strict=True):
-        rows.append(scene.edge_rows(a, b, result.resolution)[1:-1])
-        rows.append(b[None])
-    return np.concatenate(rows)
-
-
 def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
     """Return which configurations of the query are not valid, and why; None if all are."""
     from ..planning.route import names_of
@@ -177,10 +166,8 @@ def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | No
 
 
 def _lines(result: Result, written: Path | None) -> Iterator[Text]:
-    if result.solved:
-        yield Text.assemble(("solved", "bold green"), f" by {result.planner} in {result.seconds:.2f} s")
-    else:
-        yield Text.assemble(("not solved", "bold red"), f" by {result.planner} in {result.seconds:.2f} s")
+    solved = ("solved", "bold green") if result.solved else ("not solved", "bold red")
+    yield Text.assemble(solved, f" by {result.planner} in {result.seconds:.2f} s")
     yield Text(f"checks: {result.checks:,} configurations, {result.checks_per_second:,.0f} a second")
     what = "path" if result.solved else "best approach"
     yield Text(f"{what}: {len(result.path)} configurations, length {result.length:.6g} m")
@@ -199,8 +186,5 @@ def _lines(result: Result, written: Path | None) -> Iterator[Text]:
 
 
 def _summary(scene: Scene, result: Result, written: Path | None) -> dict[str, object]:
-    values: dict[str, object] = {f.name: getattr(result, f.name) for f in dataclasses.fields(result)}
-    values["checks_per_second"] = result.checks_per_second
-    values["dofs"] = scene.space.names
-    values["file"] = written
-    return values
+    values = {f.name: getattr(result, f.name) for f in dataclasses.fields(result)}
+    return {**values, "checks_per_second": result.checks_per_second, "dofs": scene.space.names, "file": written}

@@ -145,8 +145,8 @@ def plain(value: Any) -> Any:
     """Return a value in terms of JSON; what is not finite, which JSON lacks, becomes null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if hasattr(value, "tolist"):  # an array or a number of numpy
-        return plain(value.tolist())
+    if (tolist := getattr(value, "tolist", None)) is not None:  # an array or a number of numpy
+        return plain(tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

@@ -10,7 +10,7 @@ from ..errors import did_you_mean
 from ..kinematics.transforms import Array
 from .planner_space import PlanningSpace, Validity
 
-# The names that are asked for, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
+# Their names here, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
 # RRT*) cannot have one with circles for angles.
 OMPL_PLANNERS = {
     "RRTConnect": "RRTConnect",
@@ -25,7 +25,7 @@ OMPL_PLANNERS = {
     "BFMT": "BFMT",
 }
 BATCH = "BatchEST"
-"""The planner of our own, which asks in batches."""
+"""Our own planner, which checks motions in batches."""
 
 AUTO = ("RRTConnect", BATCH)
 """The planners that `auto` lets take turns: the quick one, and one for narrow places."""

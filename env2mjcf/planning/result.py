@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kinematics.transforms import Array
+from ..simulation.scene import Scene
 from .planner_space import Validity
 
 
@@ -51,6 +53,13 @@ class Plan:
     def checks_per_second(self) -> float:
         """How many configurations were looked at in a second."""
         return self.checks / max(self.seconds, 1e-9)
+
+    def steps(self, scene: Scene) -> Array:
+        """Return configurations on the path no farther apart than `resolution`, corners included, (n, dim)."""
+        edges = [scene.edge_rows(a, b, self.resolution)[1:] for a, b in pairwise(self.path)]
+        for rows, corner in zip(edges, self.path[1:], strict=True):
+            rows[-1] = corner
+        return np.concatenate([self.path[:1], *edges])
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,9 @@ def plan_through(
     _refuse(scene, rows, robot, time, seed)
     step = _step(scene, resolution)
     columns = _columns(scene, robot)
-    rows = _others_as_at_start(rows, columns)
+    # What does not move is in every row as in the first.
+    moved, rows = rows, np.repeat(rows[:1], len(rows), axis=0)
+    rows[:, columns] = moved[:, columns]
     _refuse_invalid(scene, rows)
     scene.warm_up()
     space = PlanningSpace(scene, rows, columns)
@@ -139,13 +141,6 @@ def _one(scene: Scene, q: ArrayLike) -> Array:
 def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
     every = np.arange(scene.space.dim)
     return every if robot is None else every[scene.space.robot_slices[robot]]
-
-
-def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
-    """Return what the robots go through: in every row, what does not move is as in the first."""
-    stay = np.repeat(rows[:1], len(rows), axis=0)
-    stay[:, columns] = rows[:, columns]
-    return stay
 
 
 def _step(scene: Scene, resolution: float | None) -> float:

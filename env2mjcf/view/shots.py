@@ -215,7 +215,8 @@ def _in_view(shot: Shot) -> Array:
     """Return the points that the camera must see, (n, 3)."""
     assembly = shot.scene.compiled.assembly
     points = [_moved(_vertices(p), p.pose[None]) for p in (*assembly.obstacles, *assembly.surfaces)]
-    rows = _rows(shot)
+    rows = np.stack([frame.q for frame in shot.frames])
+    rows = np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
     poses = shot.scene.link_poses(rows)
     shape = _vertices if len(rows) <= _FEW else _box
     points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(p for r in assembly.robots for p in r.links)]
@@ -226,12 +227,6 @@ def _in_view(shot: Shot) -> Array:
     wires = np.concatenate([np.zeros((0, 3)), *(np.array(mark.points) for mark in _boundary_marks(shot.scene))])
     near = len(wires) and _diagonal(wires) < _FAR_BOUNDARY * _diagonal(bodies)
     return np.concatenate([bodies, wires]) if near else bodies
-
-
-def _rows(shot: Shot) -> Array:
-    """Return all configurations that are drawn, (n, dim)."""
-    rows = np.stack([frame.q for frame in shot.frames])
-    return np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
 
 
 def _vertices(part: Part) -> Array:
