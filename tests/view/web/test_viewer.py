@@ -101,9 +101,9 @@ def test_an_angle_that_turns_without_end_stays_on_its_slider(cube: Scene) -> Non
 
 
 def test_names_are_text_whatever_they_hold() -> None:
-    assert wording.text("<script>alert('&')</script>") == "&lt;script&gt;alert(&#x27;&amp;&#x27;)&lt;/script&gt;"
-    assert wording.text("a\u202eb\x07c") == r"a\u202eb\x07c"
-    assert wording.text("**Körper** `π`") == "**Körper** `π`"
+    assert wording.as_text("<script>alert('&')</script>") == "&lt;script&gt;alert(&#x27;&amp;&#x27;)&lt;/script&gt;"
+    assert wording.as_text("a\u202eb\x07c") == r"a\u202eb\x07c"
+    assert wording.as_text("**Körper** `π`") == "**Körper** `π`"
 
 
 @pytest.mark.parametrize(
