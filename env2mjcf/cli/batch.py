@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Generator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .meter import Meter
 from .program import DONE
-from .terminal import counted, loaded, one_line, print_diagnostics, print_json, print_parts
+from .terminal import counted, loaded, one_line, print_diagnostics, print_json, print_parts, remark
 
 if TYPE_CHECKING:
     from ..batch import BatchResult
@@ -72,17 +71,13 @@ class Batch:
         with _executor(self.dask) as executor, Meter() as meter:
             result = run(
                 scene, self.configurations, self.out, self.what,
-                file_units=self.file_units, threads=self.threads, executor=executor, advance=meter.at, say=_say,
+                file_units=self.file_units, threads=self.threads, executor=executor, advance=meter.at, say=remark,
             )  # fmt: skip
         if self.output.json:
             print_json({**dataclasses.asdict(result), "rate": result.rate, "diagnostics": scene.diagnostics})
         else:
             print_parts([_summary(result)])
         return DONE
-
-
-def _say(message: str) -> None:
-    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
 
 
 @contextmanager

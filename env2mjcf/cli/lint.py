@@ -14,7 +14,7 @@ from ..errors import Diagnostic, Severity
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE, FINDING
-from .terminal import console_on, counted, one_line, print_diagnostic, print_json, printable
+from .terminal import console_on, counted, one_line, print_diagnostic, print_json, printable, remark
 
 _GITHUB_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 
@@ -69,7 +69,7 @@ class Lint:
                     print_diagnostic(console, diagnostic, result.path)
             print(summary)
         if not results:
-            print("env2mjcf: lint: no scene, robot or mesh was found", file=sys.stderr)
+            remark("lint: no scene, robot or mesh was found")
         if not all(os.path.lexists(path) for path in self.paths):
             return BAD_INPUT  # what the error says
         return FINDING if errors or (self.options.strict and warnings) else DONE

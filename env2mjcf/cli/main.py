@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ..errors import Env2MjcfError, did_you_mean
 from . import program
 from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
-from .terminal import one_line, print_diagnostics, print_json, printable, tame_libraries
+from .terminal import print_diagnostics, print_json, printable, remark, tame_libraries
 
 if TYPE_CHECKING:
     from .arguments import Verb
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except ResultsError as error:
         _abandon_stdout()
-        _complain(f"the results cannot be written to standard output: {error.strerror}")
+        remark(f"the results cannot be written to standard output: {error.strerror}")
         return BAD_INPUT
     except KeyboardInterrupt:
         return program.interrupted_status()
@@ -99,7 +99,7 @@ def _dispatch(words: list[str]) -> int:
     if name not in VERBS:
         guess = did_you_mean(name, VERBS)
         what = f"there is no verb {name!r}{f'; {guess}' if guess else ''}" if name else "a verb is missing"
-        _complain(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
+        remark(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
         return WRONG_USAGE
     # Imported here, because help and version need neither tyro nor numpy.
     from .arguments import parse
@@ -110,7 +110,7 @@ def _dispatch(words: list[str]) -> int:
     except SystemExit as ended:  # tyro has printed its help, or what is wrong
         return ended.code if isinstance(ended.code, int) else WRONG_USAGE
     except ValueError as error:  # options check themselves
-        _complain(f"{name}: {error}")
+        remark(f"{name}: {error}")
         return WRONG_USAGE
     import_module("numpy")  # all verbs need it, and where a signal interrupts its import, another error may come of it
     program.end_tidily()
@@ -147,7 +147,7 @@ def _run(name: str, verb: Verb) -> int:
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
         _show_traceback(verb.output.debug)
-        _complain(f"{name}: {error}")
+        remark(f"{name}: {error}")
         return WRONG_USAGE
 
 
@@ -156,17 +156,13 @@ def _fault(error: Exception, debug: bool = False) -> int:
     if program.interrupted:
         return program.interrupted_status()
     _show_traceback(debug)
-    _complain(program.describe(error))
+    remark(program.describe(error))
     return FAULT
 
 
 def _show_traceback(debug: bool) -> None:
     if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
         print(printable(traceback.format_exc()), end="", file=sys.stderr)
-
-
-def _complain(message: str) -> None:
-    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
 
 
 def _abandon_stdout() -> None:

@@ -93,12 +93,12 @@ class Plan:
         if (wrong := _wrong(scene, query)) is not None:
             self._say_wrong(wrong, log)
             return FINDING
-        from .meter import PlanningMeter
+        from .meter import planning_meter
 
-        with PlanningMeter(self.time) as meter:
+        with planning_meter(self.time) as progress:
             result = plan_through(
                 scene, query.q, planner=self.planner, robot=query.robot, time=self.time, seed=self.seed,
-                resolution=self.resolution, shorten=self.shorten, progress=meter.at,
+                resolution=self.resolution, shorten=self.shorten, progress=progress,
             )  # fmt: skip
         written = self._write(scene, query.robot, result)
         if self.output.json:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..diagnostics import DiagnosticLog
 from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
@@ -18,8 +16,7 @@ from .program import DONE
 from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
-    from ..kinematics.transforms import Array
-    from ..simulation.scene import Scene
+    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +59,7 @@ class Render:
 
     def run(self) -> int:
         """Draw, and say where the picture is."""
+        from ..companions.configurations import of_file, of_numbers
         from ..view.pictures import picture
 
         if not self.out.lower().endswith(".png"):
@@ -69,9 +67,12 @@ class Render:
         camera, size = camera_of(self.camera), size_of(self.size)
         refuse_unwritable(self.out, "CFG552")
         scene, log = loaded(self.scene, self.options)
-        trail = None if self.trail is None else self._trail(scene, log)
+        trail = None if self.trail is None else of_file(scene, self.trail, self.radians, self.options.limits, log).q
         print_diagnostics(log, self.output.verbose)
-        rows = self._rows(scene)
+        if self.config:
+            rows = of_numbers(scene, [str(x) for x in self.config], self.radians).q
+        else:
+            rows = scene.queries[0].q if scene.queries else scene.space.home[None]
         with working("drawing"):
             picture(
                 scene, rows[0], file=self.out, size=size, camera=camera, contacts=self.contacts, ghosts=rows[1:],
@@ -84,15 +85,3 @@ class Render:
             lines = [Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching]
             print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold"), *lines])
         return DONE
-
-    def _rows(self, scene: Scene) -> Array:
-        from ..companions.configurations import of_numbers
-
-        if self.config:
-            return of_numbers(scene, [str(x) for x in self.config], self.radians).q
-        return scene.queries[0].q if scene.queries else scene.space.home[None]
-
-    def _trail(self, scene: Scene, log: DiagnosticLog) -> Array:
-        from ..companions.configurations import of_file
-
-        return np.asarray(of_file(scene, str(self.trail), self.radians, self.options.limits, log).q)

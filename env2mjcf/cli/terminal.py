@@ -64,6 +64,11 @@ def _without_place(message: Warning | str, category: type[Warning], *_: object) 
     return f"{category.__name__}: {message}"
 
 
+def remark(message: str) -> None:
+    """Print a line about the work, not its results, to stderr."""
+    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
+
+
 def counted(count: int, what: str) -> str:
     """Return a number of things, in the plural where there is not one."""
     return f"{count} {what}{'' if count == 1 else 's'}"
