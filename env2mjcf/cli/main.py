@@ -105,8 +105,9 @@ def _dispatch(words: list[str]) -> int:
     from .arguments import parse
 
     module, class_name, _ = VERBS[name]
+    kind: type[Verb] = getattr(import_module(f".{module}", __package__), class_name)
     try:
-        verb = parse(getattr(import_module(f".{module}", __package__), class_name), name, words[1:])
+        verb = parse(kind, name, words[1:])
     except SystemExit as ended:  # tyro has printed its help, or what is wrong
         return ended.code if isinstance(ended.code, int) else WRONG_USAGE
     except ValueError as error:  # options check themselves
