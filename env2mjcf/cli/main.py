@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return program.interrupted_status()
     except Exception as error:
-        return _fault(error)
+        return _fault(error, "--debug" in words)
     return status
 
 
