@@ -86,7 +86,7 @@ def test_results_that_cannot_be_written_are_one_sentence(words: str, scenes: Pat
 
 # Bytes: the interpreter starts with them, the program does not.
 def test_too_little_memory_is_no_finding(scenes: Path) -> None:
-    limit = 250_000_000  # with a little more, OpenBLAS waits for memory without end
+    limit = 320_000_000
     status, out, said = run("check scene.env", scenes, lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
     if status == DONE:
         pytest.skip("without extras, so much memory is enough")
