@@ -19,8 +19,10 @@ def __getattr__(name: str) -> Any:
     return _export(name)
 
 
-# trimesh reads and writes `.g` meshes, too, once env2mjcf is imported.
-for _part in ("load", "export"):
-    after_import(
-        f"trimesh.exchange.{_part}", lambda module: import_module(".formats.meshes.byu", __name__).teach(module)
-    )
+def _teach_byu(module: Any) -> None:
+    import_module(".formats.meshes.byu", __name__).teach(module)
+
+
+# trimesh reads and writes `.g` meshes, too, once env2mjcf is imported, before trimesh or after it.
+after_import("trimesh.exchange.load", _teach_byu)
+after_import("trimesh.exchange.export", _teach_byu)

@@ -2,14 +2,17 @@
 
 __version__: str
 
+from . import batch as batch
 from . import companions as companions
 from . import diagnostics as diagnostics
 from . import errors as errors
+from . import formats as formats
 from . import limits as limits
 from . import model as model
 from . import options as options
 from . import planning as planning
 from . import testing as testing
+from . import transforms as transforms
 from . import translation as translation
 from . import view as view
 from .companions import PathRecord as PathRecord

@@ -7,14 +7,14 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from .diagnostics import DiagnosticLog
 from .errors import Diagnostic
 from .mjcf.folder import Staged
 from .mjcf.markup import is_mjcf
 from .model.environment import Environment
-from .options import Options, PathArgument
+from .options import OptionKeywords, Options, PathArgument
 from .report import Report
 from .simulation.loading import prepare
 from .simulation.mujoco_model import load_file
@@ -42,7 +42,7 @@ class Conversion:
     report: Report = field(repr=False)
 
 
-def convert(path: PathArgument, out: PathArgument, **options: Any) -> Conversion:
+def convert(path: PathArgument, out: PathArgument, **options: Unpack[OptionKeywords]) -> Conversion:
     """Convert a scene to MJCF.
 
     Assets are written first, the MJCF file is checked by loading it, and renamed into place last: until then the

@@ -1,8 +1,9 @@
-"""Exceptions, and the diagnostics that explain them."""
+"""Exceptions, the diagnostics that explain them, and text that is safe to show."""
 
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -126,3 +127,22 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     by_folded = {k.lower(): k for k in known}
     near = difflib.get_close_matches(word.lower(), by_folded, n=1, cutoff=0.6)
     return f"did you mean {by_folded[near[0]]!r}?" if near else ""
+
+
+# Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.
+_TRICKY = ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
+def is_tricky(character: str) -> bool:
+    """Return whether a character may play tricks on a terminal or a page: it is invisible, or moves others."""
+    return unicodedata.category(character) in _TRICKY
+
+
+def printable(text: str) -> str:
+    """Return text with control characters escaped; line feeds and tabs stay."""
+    return "".join(c if c in "\n\t" else one_line(c) for c in text)
+
+
+def one_line(text: str) -> str:
+    """Return text with every control character escaped."""
+    return "".join(c.encode("unicode_escape").decode("ascii") if is_tricky(c) else c for c in text)

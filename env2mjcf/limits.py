@@ -1,7 +1,4 @@
-"""Bounds the work on one mesh: the parts of a hostile one lie so that everything must be compared with everything.
-
-MERGED: Tells which mesh it is that takes too much work.
-"""
+"""Bounds on hostile input, and on the work that one mesh may take: its parts may lie so that each meets every other."""
 
 from __future__ import annotations
 
@@ -12,70 +9,6 @@ from dataclasses import dataclass
 
 from .diagnostics import DiagnosticLog
 from .errors import Span
-
-COSTLY = 10
-"""Steps that a comparison counts for which clips polygons."""
-
-
-class TooMuchWorkError(Exception):
-    """More steps were asked for than are allowed.
-
-    Args:
-        part: Index of the part of the mesh that they were asked for, where it is one.
-    """
-
-    def __init__(self, part: int = 0) -> None:
-        super().__init__(part)
-        self.part = part
-
-
-class Work:
-    """Counts steps, each a comparison of two parts of a mesh: about half a microsecond.
-
-    Args:
-        most: How many are allowed.
-    """
-
-    def __init__(self, most: float = math.inf) -> None:
-        self.most = most
-        self.done = 0
-
-    def spend(self, steps: int, part: int = 0) -> None:
-        """Count steps that are about to be taken, for a part of the mesh where they are for one.
-
-        Raises:
-            TooMuchWorkError: They are more than are left.
-        """
-        self.done += steps
-        if self.done > self.most:
-            raise TooMuchWorkError(part)
-
-
-@contextmanager
-def bounded(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None) -> Generator[None]:
-    """Refuse a mesh while which is worked on more steps are asked for than `limits.mesh_work`.
-
-    Args:
-        limits: Bounds on hostile input.
-        log: Where findings go.
-        subject: What the mesh is called.
-        span: Where it is named.
-
-    Raises:
-        GeometryError: More are asked for.
-    """
-    try:
-        yield
-    except TooMuchWorkError:
-        log.fail(
-            "GEO273",
-            subject,
-            f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its "
-            "parts would have to be compared",
-            hint="remove parts that overlap, choose collision='hull' (--collision hull), or "
-            + Limits.hint("mesh_work"),
-            span=span,
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,3 +59,54 @@ class Limits:
 LARGEST = 1e30
 """Largest coordinate, in file units or metres, that is computed with: volumes and inertias of what is larger overflow,
 MuJoCo's own numbers end at 3e38, and planners do not end in a wider space."""
+
+COSTLY = 10
+"""Steps that a comparison counts for which clips polygons."""
+
+
+class TooMuchWorkError(Exception):
+    """More steps were asked for than are allowed; `part` is the index of the part of the mesh, where it is one."""
+
+    def __init__(self, part: int = 0) -> None:
+        super().__init__(part)
+        self.part = part
+
+
+class Work:
+    """Counts steps, each a comparison of two parts of a mesh: about half a microsecond.
+
+    Args:
+        most: How many are allowed.
+    """
+
+    def __init__(self, most: float = math.inf) -> None:
+        self.most = most
+        self.done = 0
+
+    def spend(self, steps: int, part: int = 0) -> None:
+        """Count steps that are about to be taken, for a part of the mesh where they are for one.
+
+        Raises:
+            TooMuchWorkError: They are more than are left.
+        """
+        self.done += steps
+        if self.done > self.most:
+            raise TooMuchWorkError(part)
+
+
+@contextmanager
+def bounded(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None) -> Generator[None]:
+    """Refuse a mesh, named at `span`, that takes more steps to work on than `limits.mesh_work`.
+
+    Raises:
+        GeometryError: It does.
+    """
+    try:
+        yield
+    except TooMuchWorkError:
+        message = (
+            f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its "
+            "parts would have to be compared"
+        )
+        hint = f"remove parts that overlap, choose collision='hull' (--collision hull), or {Limits.hint('mesh_work')}"
+        log.fail("GEO273", subject, message, hint=hint, span=span)

@@ -1,4 +1,4 @@
-"""Lists everything doubtful in scenes, robots and meshes, past the first error."""
+"""Everything doubtful in scenes, robots and meshes, also after the first error."""
 
 from __future__ import annotations
 
@@ -90,10 +90,7 @@ def lint(
     Raises:
         ValueError: An option has a value that it cannot take.
     """
-    given = options or Options()
-    chosen = Options.from_keywords(
-        {f.name: getattr(given, f.name) for f in dataclasses.fields(given)} | {"strict": False}
-    )
+    chosen = dataclasses.replace(options or Options(), strict=False)
     files = _files(paths, chosen)
     results: list[LintResult] = []
     seen: set[Diagnostic] = set()
@@ -135,10 +132,9 @@ def _search(folder: str) -> Iterator[str]:
 
 
 def _leads_out(path: str) -> Diagnostic:
-    return Diagnostic(
-        "ENV152", Severity.ERROR, path, f"{path} is a link that leads out of what is searched, and is not read",
-        "name its folder, too, or allow it with allow_outside=True (--allow-outside)",
-    )  # fmt: skip
+    message = f"{path} is a link that leads out of what is searched, and is not read"
+    hint = "name its folder, too, or allow it with allow_outside=True (--allow-outside)"
+    return Diagnostic("ENV152", Severity.ERROR, path, message, hint)
 
 
 def _kind(path: str) -> Kind:
@@ -155,7 +151,7 @@ def _xml_kind(path: str) -> Kind:
         with open_regular(path) as file:
             start = file.read(_SNIFFED_BYTES)
     except OSError:
-        return Kind.SCENE  # whose reader says what is wrong
+        return Kind.SCENE  # its reader says what is wrong
     root = _ROOT_TAG.match(start.removeprefix(b"\xef\xbb\xbf"))
     tag = root.group(1).decode("ascii", "replace").lower() if root else ""
     if tag in _SCENE_TAGS:
@@ -174,7 +170,7 @@ def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
         elif kind is Kind.MESH:
             _lint_mesh(Path(path), options, log)
         else:
-            log.info("ENV132", path, f"{path} is XML, but no scene and no robot; skipped")
+            log.info("ENV132", path, f"{path} is XML, but neither a scene nor a robot; skipped")
     except Env2MjcfError as error:
         return error.diagnostics
     return tuple(log)
@@ -189,16 +185,20 @@ def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
             log = DiagnosticLog()
             _lint_robot(path, options, log)
             return tuple(log)
-        return prepare(path, options, DiagnosticLog()).diagnostics
+        log = DiagnosticLog()
+        environment = read_scene(path, options, log)
+    except Env2MjcfError as error:
+        return error.diagnostics
+    try:
+        return prepare(environment, options, log).diagnostics
     except GeometryError as error:
         # The first bad mesh ends the loading, so that each has to be looked at alone.
-        return [*error.diagnostics[:-1], *_lint_meshes(path, options, error)]
+        return [*error.diagnostics[:-1], *_lint_meshes(environment, options, error)]
     except Env2MjcfError as error:
         return error.diagnostics
 
 
-def _lint_meshes(path: str, options: Options, error: GeometryError) -> list[Diagnostic]:
-    environment = read_scene(path, options, DiagnosticLog())
+def _lint_meshes(environment: Environment, options: Options, error: GeometryError) -> list[Diagnostic]:
     bodies = {b.filename: b for m in environment.multibodies for b in m.bodies}
     found: list[Diagnostic] = []
     for body in bodies.values():

@@ -1,7 +1,4 @@
-"""Arguments that are numbers: those that are none, or out of range, are refused by name.
-
-MERGED: The options of reading, compiling and loading, in one place.
-"""
+"""The options of reading, compiling and loading, and how numbers that come in as arguments are checked."""
 
 from __future__ import annotations
 
@@ -11,46 +8,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypedDict, get_args
 
 from .errors import did_you_mean
 from .limits import Limits
-
-
-def whole(name: str, value: object, least: int, most: int | None = None) -> int:
-    """Return an argument that is a whole number.
-
-    Raises:
-        TypeError: It is none (True and 2.0 are not); the message names it.
-        ValueError: It is below `least` or above `most`.
-    """
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(f"{name} is {value!r}; expected a whole number")
-    number = int(value)
-    if number < least or (most is not None and number > most):
-        raise ValueError(f"{name} is {number}; expected {_range(str(least), most)}")
-    return number
-
-
-def positive(name: str, value: object, most: float | None = None) -> float:
-    """Return an argument that is a finite number above zero.
-
-    Raises:
-        TypeError: It is no number; the message names it.
-        ValueError: It is not positive, not finite, or above `most`.
-    """
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise TypeError(f"{name} is {value!r}; expected a number")
-    number = float(value)
-    if not 0 < number < math.inf or (most is not None and number > most):
-        limit = "" if most is None else f" up to {most:g}"
-        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
-    return number
-
-
-def _range(least: str, most: int | None) -> str:
-    return f"at least {least}" if most is None else f"{least} to {most}"
-
 
 Semantics = Literal["planner", "page"]
 Collision = Literal["auto", "hull", "surface", "solid", "coacd"]
@@ -65,7 +26,9 @@ PathArgument = str | PathLike[str]
 class Options:
     """Everything that may be chosen when a scene is read, compiled or loaded.
 
-    The fields are the keyword arguments of `read`, `convert` and `load`, and the flags of the command line.
+    The fields are the keyword arguments of `read`, `convert` and `load`, and the flags of the command line. They are
+    checked however the options are made: a value of a wrong kind is a TypeError, one out of range a ValueError. A list
+    may stand for a tuple, and one file or folder for several.
 
     Attributes:
         robots: Dialect E robot files, appended after the file's own Active bodies.
@@ -77,15 +40,17 @@ class Options:
         allow_outside: May meshes outside the scene's folder and `mesh_dirs` be read.
         collision: How meshes become convex collision shapes.
         primitives: Write exact boxes as box geoms.
-        self_collision: Test links of one robot against each other.
-        adjacent_links: Links within this many connections of each other are not tested.
+        self_collision: Test links of one robot against each other; unless given, what a problem XML says, else True.
+        adjacent_links: Links within this many connections of each other are not tested; unless given, what a problem
+            XML says, else 1.
         inter_robot: Test links of different robots against each other.
         exclude_pairs: Pairs of body names that are not tested.
         exclude_rest_contacts: Do not test pairs that touch at home.
         boundary: Draw the boundary as a wire box, or build it as walls (which act in simulation only).
         actuators: Add position actuators to every joint.
         density: Density of bodies without a mass of their own, kg per cubic metre.
-        gravity: Acceleration of gravity, metres per second squared.
+        gravity: Acceleration of gravity, metres per second squared; unless given, the file's where that is not zero,
+            times `scale`, else (0, 0, -9.81).
         ground: Add a ground plane below the scene.
         scale: Metres per file unit, applied to every length.
         engine: Which engine answers queries.
@@ -102,104 +67,184 @@ class Options:
     allow_outside: bool = False
     collision: Collision = "auto"
     primitives: bool = False
-    self_collision: bool = True
-    adjacent_links: int = 1
+    self_collision: bool | None = None
+    adjacent_links: int | None = None
     inter_robot: bool = True
     exclude_pairs: tuple[tuple[str, str], ...] = ()
     exclude_rest_contacts: bool = False
     boundary: BoundaryStyle | None = None
     actuators: Actuators | None = None
     density: float = 1000.0
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    gravity: tuple[float, float, float] | None = None
     ground: bool = False
     scale: float = 1.0
     engine: Engine = "auto"
     cache: bool = True
     limits: Limits = dataclasses.field(default_factory=Limits)
 
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            object.__setattr__(self, field.name, _checked(field.name, getattr(self, field.name)))
+
     @classmethod
     def from_keywords(cls, keywords: Mapping[str, Any]) -> Options:
         """Build options from keyword arguments.
 
         Raises:
-            TypeError: A keyword is not an option; the message lists the valid ones.
+            TypeError: A keyword is not an option; the message lists the valid ones. Or a value is of a wrong kind.
             ValueError: A value is not one that the option can take.
         """
-        known = {f.name: f for f in dataclasses.fields(cls)}
+        known = [f.name for f in dataclasses.fields(cls)]
         for name in keywords:
             if name not in known:
                 guess = did_you_mean(name, known)
                 raise TypeError(f"unknown option {name!r}{f'; {guess}' if guess else ''} (options: {', '.join(known)})")
-        values = dict(keywords)
-        for name, value in values.items():
-            _check_kind(name, value)
-        for name in ("robots", "mesh_dirs"):
-            value = values.get(name, ())
-            values[name] = (value,) if isinstance(value, (str, PathLike)) else tuple(value)
-        if "exclude_pairs" in values:
-            values["exclude_pairs"] = tuple(_pair(p) for p in values["exclude_pairs"])
-        if "gravity" in values:
-            values["gravity"] = tuple(float(g) for g in values["gravity"])
-        options = cls(**values)
-        options._validate()
-        return options
+        return cls(**keywords)
 
-    def _validate(self) -> None:
-        _one_of("semantics", self.semantics, get_args(Semantics))
-        _one_of("dialect", self.dialect, (None, *get_args(DialectName)))
-        _one_of("collision", self.collision, get_args(Collision))
-        _one_of("boundary", self.boundary, (None, *get_args(BoundaryStyle)))
-        _one_of("actuators", self.actuators, (None, *get_args(Actuators)))
-        _one_of("engine", self.engine, get_args(Engine))
-        if not (0 < self.scale < float("inf")):
-            raise ValueError(f"scale must be a positive number, got {self.scale!r}")
-        if not (0 < self.density < float("inf")):
-            raise ValueError(f"density must be a positive number, got {self.density!r}")
-        if self.adjacent_links < 0:
-            raise ValueError(f"adjacent_links must not be negative, got {self.adjacent_links!r}")
-        if len(self.gravity) != 3 or not all(abs(g) < float("inf") for g in self.gravity):
-            raise ValueError(f"gravity must be three finite numbers, got {self.gravity!r}")
+    # What a problem XML may say, too, where an option leaves it to the file.
+
+    def tests_self(self, ignored: bool | None) -> bool:
+        """Return whether links of one robot are tested against each other; `ignored` is what the file says."""
+        return not ignored if self.self_collision is None else self.self_collision
+
+    def untested_steps(self, of_file: int | None) -> int:
+        """Return within how many connections links are not tested."""
+        given = of_file if self.adjacent_links is None else self.adjacent_links
+        return 1 if given is None else given
+
+    def acceleration(self, of_file: tuple[float, float, float] | None) -> tuple[float, float, float]:
+        """Return gravity in metres per second squared; the file's is in its own units of length."""
+        if self.gravity is not None:
+            return self.gravity
+        if of_file is None or not any(of_file):
+            return 0.0, 0.0, -9.81
+        x, y, z = (g * self.scale for g in of_file)
+        return x, y, z
 
 
-def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    if value not in allowed:
+class OptionKeywords(TypedDict, total=False):
+    """The fields of `Options` as the keyword arguments of `read`, `convert` and `load`, for type checkers."""
+
+    robots: PathArgument | Iterable[PathArgument]
+    query: PathArgument | None
+    semantics: Semantics
+    dialect: DialectName | None
+    strict: bool
+    mesh_dirs: PathArgument | Iterable[PathArgument]
+    allow_outside: bool
+    collision: Collision
+    primitives: bool
+    self_collision: bool | None
+    adjacent_links: int | None
+    inter_robot: bool
+    exclude_pairs: Iterable[tuple[str, str]]
+    exclude_rest_contacts: bool
+    boundary: BoundaryStyle | None
+    actuators: Actuators | None
+    density: float
+    gravity: Iterable[float] | None
+    ground: bool
+    scale: float
+    engine: Engine
+    cache: bool
+    limits: Limits
+
+
+_CHOICES: dict[str, tuple[str | None, ...]] = {
+    "semantics": get_args(Semantics),
+    "dialect": (None, *get_args(DialectName)),
+    "collision": get_args(Collision),
+    "boundary": (None, *get_args(BoundaryStyle)),
+    "actuators": (None, *get_args(Actuators)),
+    "engine": get_args(Engine),
+}
+_KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
+    **dict.fromkeys(("density", "scale"), (Real, "a number")),
+    **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
+    **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
+    "adjacent_links": (Integral, "an integer"),
+    "limits": (Limits, "Limits(...)"),
+}
+# What a problem XML may say, too: None leaves it to the file.
+_OF_THE_FILE = ("self_collision", "adjacent_links", "gravity")
+
+
+def _checked(name: str, given: object) -> object:
+    """Return the value of an option, lists as tuples.
+
+    Raises:
+        TypeError: It is of a wrong kind.
+        ValueError: It is not one that the option can take.
+    """
+    if name in _CHOICES:
+        return _one_of(name, given, _CHOICES[name])
+    if name == "query" or (given is None and name in _OF_THE_FILE):
+        return given
+    kind, expected = _KINDS.get(name, (bool, "True or False"))
+    if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
+        raise TypeError(f"{name}={given!r}; expected {expected}")
+    value: Any = given
+    if name in ("robots", "mesh_dirs"):
+        return (value,) if isinstance(value, (str, PathLike)) else tuple(value)
+    if name == "exclude_pairs":
+        return tuple(_pair(pair) for pair in value)
+    if name == "gravity":
+        return _gravity(value)
+    if name in ("density", "scale") and not 0 < value < math.inf:
+        raise ValueError(f"{name} must be a positive number, got {value!r}")
+    if name == "adjacent_links" and value < 0:
+        raise ValueError(f"{name} must not be negative, got {value!r}")
+    return value
+
+
+def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object:
+    if not isinstance(value, str | None) or value not in allowed:
         guess = did_you_mean(str(value), [str(a) for a in allowed])
         choices = ", ".join(repr(a) for a in allowed)
         raise ValueError(f"{name}={value!r} is not one of {choices}{f'; {guess}' if guess else ''}")
-
-
-_NUMBERS = ("density", "scale")
-_FLAGS = (
-    "strict",
-    "allow_outside",
-    "primitives",
-    "self_collision",
-    "inter_robot",
-    "exclude_rest_contacts",
-    "ground",
-    "cache",
-)
-_LISTS = ("gravity", "exclude_pairs")
-
-
-def _check_kind(name: str, value: Any) -> None:
-    """Raise a TypeError that names an option whose value is of a wrong kind."""
-    expected = ""
-    if name in _FLAGS and not isinstance(value, bool):
-        expected = "True or False"
-    elif name in _NUMBERS and (isinstance(value, bool) or not isinstance(value, Real)):
-        expected = "a number"
-    elif name == "adjacent_links" and (isinstance(value, bool) or not isinstance(value, Integral)):
-        expected = "an integer"
-    elif name == "limits" and not isinstance(value, Limits):
-        expected = "Limits(...)"
-    elif name in (*_LISTS, "robots", "mesh_dirs") and not isinstance(value, (Iterable, PathLike)):
-        expected = "a sequence"
-    if expected:
-        raise TypeError(f"{name}={value!r}; expected {expected}")
+    return value
 
 
 def _pair(value: Any) -> tuple[str, str]:
-    if isinstance(value, str) or len(pair := tuple(value)) != 2:
+    if isinstance(value, str) or not isinstance(value, Iterable) or len(pair := tuple[Any, ...](value)) != 2:
         raise ValueError(f"exclude_pairs holds {value!r}; expected pairs of names, as in [('link1', 'block')]")
     return str(pair[0]), str(pair[1])
+
+
+def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
+    values = tuple(value)
+    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(g) for g in values):
+        raise ValueError(f"gravity must be three finite numbers, got {values!r}")
+    return tuple(float(g) for g in values)
+
+
+def whole(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Return an argument that is a whole number.
+
+    Raises:
+        TypeError: It is not one (True and 2.0 are not, either); the message names it.
+        ValueError: It is below `least` or above `most`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} is {value!r}; expected a whole number")
+    number = int(value)
+    expected = f"at least {least}" if most is None else f"{least} to {most}"
+    if number < least or (most is not None and number > most):
+        raise ValueError(f"{name} is {number}; expected {expected}")
+    return number
+
+
+def positive(name: str, value: object, most: float | None = None) -> float:
+    """Return an argument that is a finite number above zero.
+
+    Raises:
+        TypeError: It is not a number; the message names it.
+        ValueError: It is not positive, not finite, or above `most`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name} is {value!r}; expected a number")
+    number = float(value)
+    if not 0 < number < math.inf or (most is not None and number > most):
+        limit = "" if most is None else f" up to {most:g}"
+        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
+    return number

@@ -61,19 +61,14 @@ def pair_table(robots: Sequence[Robot], obstacles: Sequence[str], options: Optio
         robots: All robots.
         obstacles: Names of the obstacles' bodies.
         options: `self_collision`, `adjacent_links`, `inter_robot`, `exclude_pairs` are used.
-        rules: What a problem XML says; it gives way to options that were changed.
+        rules: What a problem XML says; it gives way to options that are given.
 
     Raises:
         ValueError: `exclude_pairs` names an unknown body.
     """
     names = [*(n for r in robots for n in r.links), *obstacles]
     given = {frozenset(_known(p, names)) for p in options.exclude_pairs}
-    defaults = Options()
-    adjacent, self_collision = options.adjacent_links, options.self_collision
-    if rules.adjacent_links is not None and adjacent == defaults.adjacent_links:
-        adjacent = rules.adjacent_links
-    if rules.ignore_self_collision is not None and self_collision == defaults.self_collision:
-        self_collision = not rules.ignore_self_collision
+    self_collision = options.tests_self(rules.ignore_self_collision)
     tested: list[Pair] = []
     excluded: list[Pair] = []
 
@@ -89,7 +84,7 @@ def pair_table(robots: Sequence[Robot], obstacles: Sequence[str], options: Optio
             for obstacle in obstacles:
                 static = groups[i] == _WORLD
                 judge(Pair(link, obstacle, "obstacle", static), not static or _tests_static(robot.kinematics, i))
-        near = _within(robot.kinematics.multibody, adjacent)
+        near = _within(robot.kinematics.multibody, options.untested_steps(rules.adjacent_links))
         for i, j in combinations(range(len(robot.links)), 2):
             pair = Pair(robot.links[i], robot.links[j], "self", groups[i] == groups[j])
             judge(pair, self_collision and (i, j) not in near)

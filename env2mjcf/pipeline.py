@@ -47,9 +47,9 @@ class Compiled:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def compile_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Compiled:
-    """Take a file through the whole pipeline."""
-    environment = read_scene(path, options, log)
+def compile_scene(source: PathArgument | Environment, options: Options, log: DiagnosticLog) -> Compiled:
+    """Take a file, or what was read from it with the same log, through the whole pipeline."""
+    environment = source if isinstance(source, Environment) else read_scene(source, options, log)
     # What counts alone tell is told before the work on the geometry.
     _check_pairs(environment, options, log)
     refuse_long_chains(environment, log)

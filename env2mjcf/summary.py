@@ -1,28 +1,23 @@
-"""What can be said about a scene from its text alone, without meshes.
-
-MERGED: How far apart the planner's and the web page's reading of dialect A put things.
-"""
+"""What can be said about a scene from its text alone, without meshes."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .diagnostics import DiagnosticLog
-from .formats.reading import read
 from .kinematics.forward import RobotKinematics
 from .kinematics.space import ConfigurationSpace
 from .kinematics.transforms import Array
 from .kinematics.tree import dof_names
 from .model.dialects import RULES
-from .model.environment import Boundary, Dialect, Environment, Resolution
+from .model.environment import Boundary, DHForm, Dialect, Environment, MultiBody, Resolution
 from .model.names import body_names
 from .model.scaling import scaled
-from .system.files import NoRegularFileError, open_regular
+from .options import Options
 
 _TOLD_BY = {
     Dialect.A: "begins with a count, then 'MultiBody'",
@@ -87,14 +82,13 @@ class SceneSummary:
     queries: tuple[QuerySummary, ...]
 
 
-def describe(environment: Environment, options: Mapping[str, Any]) -> SceneSummary:
+def describe(environment: Environment, options: Options) -> SceneSummary:
     """Sum up what a scene's text says.
 
     Args:
         environment: The scene, in file units.
-        options: Fields of `Options` that it was read with.
+        options: What it was read with.
     """
-    metres = float(options["scale"])
     names = body_names(environment)
     return SceneSummary(
         path=environment.path,
@@ -102,11 +96,11 @@ def describe(environment: Environment, options: Mapping[str, Any]) -> SceneSumma
         dialect=environment.dialect.value,
         told_by=_told_by(environment, options),
         semantics=environment.semantics,
-        readings=compare_readings(environment, options),
-        metres_per_unit=metres,
+        readings=compare_readings(environment, options.scale),
+        metres_per_unit=float(options.scale),
         boundary=environment.boundary,
         resolution=environment.resolution,
-        robots=tuple(_robots(environment, metres)),
+        robots=tuple(_robots(environment, float(options.scale))),
         obstacles=_names_of(environment, environment.obstacles, names),
         surfaces=_names_of(environment, environment.surfaces, names),
         queries=tuple(QuerySummary(t.robot, t.label, len(t.configurations)) for t in environment.tasks),
@@ -150,32 +144,14 @@ def _robots(environment: Environment, metres: float) -> list[RobotSummary]:
     return summaries
 
 
-def _told_by(environment: Environment, options: Mapping[str, Any]) -> str:
-    path = _environment_file(environment)
-    if _begins_as_xml(Path(path)):
-        reason = "XML"
-    else:
-        reason = "as --dialect says" if options["dialect"] else _TOLD_BY[environment.dialect]
-    return reason if path == environment.path else f"{path}: {reason}"
-
-
-def _environment_file(environment: Environment) -> str:
-    """Return the file that describes the environment, which a problem XML names."""
+def _told_by(environment: Environment, options: Options) -> str:
+    of_text = "as --dialect says" if options.dialect else _TOLD_BY[environment.dialect]
+    reason = "XML" if environment.xml else of_text
+    # A problem XML names the file that describes the environment, and may give the boundary itself.
     own = [m.span for m in environment.multibodies if m.robot_file is None]
     spans = [environment.boundary.span if environment.boundary else None, *own]
-    # A problem XML may give the boundary itself.
     named = [s.path for s in spans if s is not None and s.path != environment.path]
-    return named[0] if named else environment.path
-
-
-def _begins_as_xml(path: Path) -> bool:
-    try:
-        file = open_regular(path)
-    except NoRegularFileError as error:
-        hint = "save it as a file, which is read twice"
-        DiagnosticLog().fail("ENV104", str(path), f"{path} cannot be described: {error.strerror}", hint=hint)
-    with file:
-        return file.read(1024).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")
+    return f"{named[0]}: {reason}" if named else reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,24 +163,27 @@ class Readings:
     link: str
 
 
-def compare_readings(environment: Environment, options: Mapping[str, Any]) -> Readings | None:
+def compare_readings(environment: Environment, scale: float) -> Readings | None:
     """Return how far apart the two readings of dialect A's connections put the links at home; None elsewhere."""
     if environment.dialect is not Dialect.A or not any(r.connections for r in environment.robots):
         return None
     other = "page" if environment.semantics == "planner" else "planner"
-    changed = read(environment.path, **{**options, "semantics": other, "strict": False})
-    here, there = (_origins_at_home(scaled(e, options["scale"])) for e in (environment, changed))
+    changed = dataclasses.replace(environment, multibodies=tuple(map(_read_otherwise, environment.multibodies)))
+    here, there = (_origins_at_home(scaled(e, scale)) for e in (environment, changed))
     apart = np.linalg.norm(here - there, axis=1)
     worst = int(apart.argmax())
-    return Readings(other, float(apart[worst]), _robot_links(environment)[worst])
+    return Readings(
+        other, float(apart[worst]), _names_of(environment, environment.robots, body_names(environment))[worst]
+    )
+
+
+def _read_otherwise(multibody: MultiBody) -> MultiBody:
+    """Return a multibody of dialect A in the other reading, which swaps the transforms and the DH form."""
+    swapped = (dataclasses.replace(c, to_dh=c.to_body, to_body=c.to_dh) for c in multibody.connections)
+    form = DHForm.STANDARD if multibody.dh_form is DHForm.CRAIG else DHForm.CRAIG
+    return dataclasses.replace(multibody, connections=tuple(swapped), dh_form=form)
 
 
 def _origins_at_home(environment: Environment) -> Array:
     robots = [RobotKinematics.of(r) for r in environment.robots]
     return np.concatenate([r.forward(r.home())[:, :3, 3] for r in robots])
-
-
-def _robot_links(environment: Environment) -> list[str]:
-    names = body_names(environment)
-    places = (next(i for i, m in enumerate(environment.multibodies) if m is r) for r in environment.robots)
-    return [n for i in places for n in names[i]]

@@ -29,8 +29,17 @@ import pytest
 
 import env2mjcf
 
+_OF_THE_FILE = "None: what a problem XML says, else the default of before; so that the default, given, overrules it"
+_VERBS = ("convert", "info", "check", "lint", "batch", "render", "play", "view", "plan")
 # The path of an entry of the list, as a failure prints it, and why it is another now.
 CHANGED: dict[str, str] = {
+    "names/env2mjcf/Options/constructor/parameters": _OF_THE_FILE,
+    **{f"options/Options/{name}": _OF_THE_FILE for name in ("self_collision", "adjacent_links", "gravity")},
+    **{
+        f"commands/{verb}/flags/{flag}/default": _OF_THE_FILE
+        for verb in _VERBS
+        for flag in ("--self-collision", "--adjacent-links", "--gravity")
+    },
     "entry_points/pytest11/env2mjcf": "the plugin is part of the package; only its entry point is public",
     **dict.fromkeys(
         ("names/env2mjcf/Scene/methods/step", "instances/Scene/step"),

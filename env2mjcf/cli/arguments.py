@@ -1,7 +1,4 @@
-"""From words of the command line to a verb, through tyro.
-
-MERGED: Cameras and sizes of pictures, as words of the command line.
-"""
+"""From words of the command line to a verb, through tyro, and to cameras and sizes of pictures."""
 
 from __future__ import annotations
 
@@ -10,14 +7,16 @@ import inspect
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Protocol, TypeVar, cast
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from ..options import Options, PathArgument
-from ..view.framing import DIRECTION_NAMES, Direction
-from .printing import one_line
+from ..options import OptionKeywords, Options, PathArgument
+from .terminal import one_line
+
+if TYPE_CHECKING:
+    from ..view.cameras import Direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +84,9 @@ def _parse(verb: type[V], name: str, words: Sequence[str], *, silent: bool = Fal
     )
 
 
-def keywords(options: Options) -> dict[str, Any]:
-    """Return options as keyword arguments of the API, which checks them."""
-    return {f.name: getattr(options, f.name) for f in dataclasses.fields(options)}
+def keywords(options: Options) -> OptionKeywords:
+    """Return options as keyword arguments of the API."""
+    return cast("OptionKeywords", {f.name: getattr(options, f.name) for f in dataclasses.fields(options)})
 
 
 def _paths_as_text() -> ConstructorRegistry:
@@ -117,6 +116,8 @@ def camera_of(word: str | None) -> str | Direction | None:
     Raises:
         ValueError: It is neither.
     """
+    from ..view.cameras import DIRECTION_NAMES, Direction
+
     if word is None or word in DIRECTION_NAMES:
         return word
     try:
@@ -133,7 +134,7 @@ def size_of(word: str) -> tuple[int, int]:
     """Return the width and height that a word stands for.
 
     Raises:
-        ValueError: It is no size.
+        ValueError: It is not a size.
     """
     parts = word.lower().split("x")
     if len(parts) != 2 or not all(p.isascii() and p.isdigit() and len(p) < 9 for p in parts):

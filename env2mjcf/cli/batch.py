@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Generator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -15,10 +14,10 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..options import Options
-from .arguments import OptionFlags, Output, OutputFlags, keywords
+from .arguments import OptionFlags, Output, OutputFlags
 from .meter import Meter
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
 from .program import DONE
+from .terminal import counted, loaded, one_line, print_diagnostics, print_json, print_parts, remark
 
 if TYPE_CHECKING:
     from ..batch import BatchResult
@@ -49,8 +48,6 @@ class Batch:
         file_units: Numbers are the scene file's own (turns or fractions of pi, and its lengths).
         threads: Number of threads, if not all cores.
         dask: Address of a Dask scheduler whose workers do the work.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -66,27 +63,21 @@ class Batch:
     def run(self) -> int:
         """Write the verdicts, and print how many there are of each kind."""
         from ..batch import run
-        from ..simulation.loading import load
 
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"--threads is {self.threads}; expected at least 1")
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
+        scene, _ = loaded(self.scene, self.options)
         print_diagnostics(scene.diagnostics, self.output.verbose)
         with _executor(self.dask) as executor, Meter() as meter:
             result = run(
                 scene, self.configurations, self.out, self.what,
-                file_units=self.file_units, threads=self.threads, executor=executor, advance=meter.at, say=_say,
+                file_units=self.file_units, threads=self.threads, executor=executor, advance=meter.at, say=remark,
             )  # fmt: skip
         if self.output.json:
             print_json({**dataclasses.asdict(result), "rate": result.rate, "diagnostics": scene.diagnostics})
         else:
             print_parts([_summary(result)])
         return DONE
-
-
-def _say(message: str) -> None:
-    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
 
 
 @contextmanager
@@ -118,5 +109,5 @@ def _executor(address: str | None) -> Generator[Executor | None]:
 def _summary(result: BatchResult) -> Text:
     counts = ", ".join(f"{n} {what}" for what, n in result.counts.items())
     least = "" if result.least is None else f"; least clearance {result.least:.6g} m"
-    rows = f"{result.rows} configuration{'' if result.rows == 1 else 's'}"
-    return Text(f"{rows}: {counts}{least}; written to {one_line(str(result.output))}", "bold")
+    rows, written = counted(result.rows, "configuration"), one_line(str(result.output))
+    return Text(f"{rows}: {counts}{least}; written to {written}", "bold")

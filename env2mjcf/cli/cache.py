@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
 from .arguments import Output, OutputFlags
-from .printing import one_line, print_json
 from .program import BAD_INPUT, DONE
+from .terminal import one_line, print_json, remark
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +30,6 @@ class Cache:
 
     Attributes:
         action: What to do.
-        output: How to report.
     """
 
     action: Annotated[Literal["info", "clear", "warm"], Positional]
@@ -49,7 +47,7 @@ class Cache:
             try:
                 cache.clear()
             except OSError as error:
-                print(f"env2mjcf: cache: {one_line(str(error))}", file=sys.stderr)
+                remark(f"cache: {error}")
                 return BAD_INPUT
         if self.output.json:
             print_json(before if self.action == "info" else {"folder": before.folder, "removed": before.entries})

@@ -17,12 +17,12 @@ from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError
+from ..errors import ConversionError, one_line
 from ..options import Options
 from ..system.files import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, plain, print_diagnostics, print_json, print_parts, working
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE, FINDING
+from .terminal import loaded, plain, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..companions.records import Configurations, Graph, Poses
@@ -62,8 +62,6 @@ class Check:
         certified: Prove, too, that nothing touches between the checks of an edge.
         picture: Draw a PNG file, too: configurations as dots and edges as lines, red where they are invalid, and the
             robot where the first one is.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -78,7 +76,6 @@ class Check:
 
     def run(self) -> int:
         """Print a verdict on each configuration; 1 if any is invalid."""
-        from ..simulation.loading import load
         from ..simulation.verdicts import Verdicts
         from ..view.graph_picture import draw
 
@@ -89,10 +86,7 @@ class Check:
         if self.configurations and self.options.query is not None:
             raise ValueError("configurations are given twice: behind the scene and with --query")
         options = dataclasses.replace(self.options, query=None)
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, options)
         rows = self._rows(scene, log)
         print_diagnostics(log, self.output.verbose)
         graph = rows.graph

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
-from .printing import one_line
+from .terminal import one_line
 
 if TYPE_CHECKING:
     from ..report import Report
@@ -100,9 +100,9 @@ def _robot(number: int, robot: RobotSummary) -> Iterator[RenderableType]:
         return
     table = _table("", "unit", "limits in file", "home", "limits in rad, m", "home", right=(3, 5))
     for dof in robot.dofs:
-        unit, home = _UNITS[dof.unit], f"{dof.home:.6g}"
-        table.add_row(*_cells(dof.name, unit, _limits(dof, dof.lower, dof.upper), home,
-                              _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"))  # fmt: skip
+        of_file = _limits(dof, dof.lower, dof.upper), f"{dof.home:.6g}"
+        in_si = _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"
+        table.add_row(*_cells(dof.name, _UNITS[dof.unit], *of_file, *in_si))
     yield _indented(table)
 
 
@@ -118,10 +118,10 @@ def _semantics(scene: SceneSummary) -> str:
     apart = scene.readings
     if apart is None:
         return f"the {scene.semantics}'s"
-    whose = f"the {scene.semantics}'s; the {apart.other}'s reading"
+    reading = f"the {scene.semantics}'s; the {apart.other}'s reading"
     if apart.distance == 0:
-        return f"{whose} puts every link at the same place at home"
-    return f"{whose} puts links up to {apart.distance:.6g} m ({one_line(apart.link)}) elsewhere at home"
+        return f"{reading} puts every link at the same place at home"
+    return f"{reading} puts links up to {apart.distance:.6g} m ({one_line(apart.link)}) elsewhere at home"
 
 
 def _boundary(boundary: Boundary | None) -> str:

@@ -11,11 +11,10 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from ..model.names import file_stem
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, working
 from .program import DONE
+from .terminal import one_line, print_diagnostics, print_json, working
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +31,6 @@ class Convert:
         scene: An env file, an XML environment or a problem XML.
         out: The folder to write to, or a .xml file in one. Without it: <scene>_mjcf in the current folder.
         output_path: The same, as a flag.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -45,6 +42,7 @@ class Convert:
     def run(self) -> int:
         """Convert and print where the MJCF lies."""
         from ..conversion import convert
+        from ..model.names import file_stem
 
         if self.out is not None and self.output_path is not None:
             raise ValueError(f"the output is given twice, as {self.out!r} and as --out {self.output_path!r}")

@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
-from rich.console import RenderableType
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Env2MjcfError
 from ..options import Options
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .columns import geometry_part, pairs_part, text_part
-from .printing import plain, print_diagnostics, print_json, print_parts, working
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE
+from .terminal import plain, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from ..simulation.scene import Scene
     from ..simulation.verdicts import PairCount
     from ..summary import SceneSummary
@@ -39,8 +39,6 @@ class Info:
         scene: An env file, an XML environment or a problem XML.
         pairs: List every pair of bodies that is tested, and how often it touches in sampled configurations.
         samples: Number of configurations that --pairs samples.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -54,14 +52,18 @@ class Info:
         if self.samples < 1:
             raise ValueError(f"--samples is {self.samples}; expected at least 1")
         from ..formats.reading import read_scene
+        from ..simulation.loading import prepare
         from ..summary import describe
 
-        chosen = Options.from_keywords(keywords(self.options))
-        environment = read_scene(self.scene, chosen, DiagnosticLog(chosen.strict))
-        summary = describe(environment, keywords(chosen))
-        loaded = self._load(chosen)
-        error = loaded if isinstance(loaded, Env2MjcfError) else None
-        scene = None if isinstance(loaded, Env2MjcfError) else loaded
+        log = DiagnosticLog(self.options.strict)
+        environment = read_scene(self.scene, self.options, log)
+        summary = describe(environment, self.options)
+        scene, error = None, None
+        try:
+            with working(f"loading {self.scene}"):
+                loaded = scene = prepare(environment, self.options, log)
+        except Env2MjcfError as wrong:
+            loaded = error = wrong
         if self.output.json:
             facts: dict[str, Any] = self._facts(summary, scene)
             if error:
@@ -72,15 +74,6 @@ class Info:
         # Findings that are only worth knowing are part of what was asked for.
         print_diagnostics(loaded.diagnostics, verbose=not self.output.json or self.output.verbose)
         return BAD_INPUT if error else DONE
-
-    def _load(self, options: Options) -> Scene | Env2MjcfError:
-        from ..simulation.loading import prepare
-
-        try:
-            with working(f"loading {self.scene}"):
-                return prepare(self.scene, options, DiagnosticLog(options.strict))
-        except Env2MjcfError as error:
-            return error
 
     def _facts(self, summary: SceneSummary, scene: Scene | None) -> dict[str, Any]:
         facts: dict[str, Any] = plain(summary)
@@ -97,6 +90,8 @@ class Info:
         return facts
 
     def _parts(self, summary: SceneSummary, scene: Scene | None) -> Iterator[RenderableType]:
+        from .columns import geometry_part, pairs_part, text_part
+
         yield from text_part(summary)
         if scene is not None:
             yield from geometry_part(scene.report)

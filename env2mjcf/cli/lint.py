@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
-from rich.console import Console
 from tyro.conf import Positional
 
 from ..errors import Diagnostic, Severity
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
-from .printing import one_line, print_diagnostic, print_json, printable
 from .program import BAD_INPUT, DONE, FINDING
-
-if TYPE_CHECKING:
-    from ..linting import LintResult
+from .terminal import console_on, counted, one_line, print_diagnostic, print_json, printable, remark
 
 _GITHUB_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 
@@ -41,8 +36,6 @@ class Lint:
     Attributes:
         paths: Folders, scenes, robot files or meshes.
         github: Print GitHub annotations.
-        output: How to report.
-        options: What may be chosen.
     """
 
     paths: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH [PATH ...]"), Positional]
@@ -60,9 +53,8 @@ class Lint:
             raise ValueError("--json and --github exclude each other")
         results = lint(self.paths, self.options, progress=True)
         errors, warnings, notes = (sum(r.count(s) for r in results) for s in reversed(Severity))
-        summary = f"{_some(len(results), 'file')}: {_some(errors, 'error')}, {_some(warnings, 'warning')}, " + _some(
-            notes, "note"
-        )
+        counts = [(errors, "error"), (warnings, "warning"), (notes, "note")]
+        summary = f"{counted(len(results), 'file')}: {', '.join(counted(n, what) for n, what in counts)}"
         if self.output.json:
             print_json({"errors": errors, "warnings": warnings, "notes": notes, "files": results})
         elif self.github:
@@ -71,10 +63,13 @@ class Lint:
                     print(github_annotation(diagnostic, result.path))
             print(summary, file=sys.stderr)
         else:
-            _print_text(results)
+            console = console_on(sys.stdout, soft_wrap=True)
+            for result in results:
+                for diagnostic in result.diagnostics:
+                    print_diagnostic(console, diagnostic, result.path)
             print(summary)
         if not results:
-            print("env2mjcf: lint: no scene, robot or mesh was found", file=sys.stderr)
+            remark("lint: no scene, robot or mesh was found")
         if not all(os.path.lexists(path) for path in self.paths):
             return BAD_INPUT  # what the error says
         return FINDING if errors or (self.options.strict and warnings) else DONE
@@ -103,14 +98,3 @@ def _github_text(text: str) -> str:
 
 def _github_property(text: str) -> str:
     return _github_text(one_line(text)).replace(":", "%3A").replace(",", "%2C")
-
-
-def _print_text(results: Sequence[LintResult]) -> None:
-    console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=True)
-    for result in results:
-        for diagnostic in result.diagnostics:
-            print_diagnostic(console, diagnostic, result.path)
-
-
-def _some(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"

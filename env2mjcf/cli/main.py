@@ -9,13 +9,15 @@ import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from ..errors import Env2MjcfError, did_you_mean
-from ..view.offscreen import RenderError, refuse_unknown
 from . import program
-from .arguments import Verb, parse
-from .printing import one_line, print_diagnostics, print_json, printable, tame_libraries
 from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
+from .terminal import print_diagnostics, print_json, printable, remark, tame_libraries
+
+if TYPE_CHECKING:
+    from .arguments import Verb
 
 # Each verb: its module here, its class there, what it does.
 VERBS = {
@@ -62,7 +64,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: What stands behind the program's name; None takes it from `sys.argv`.
     """
-    program.end_tidily()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         tame_libraries()  # the process is the program's own
@@ -78,12 +79,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except ResultsError as error:
         _abandon_stdout()
-        _complain(f"the results cannot be written to standard output: {error.strerror}")
+        remark(f"the results cannot be written to standard output: {error.strerror}")
         return BAD_INPUT
     except KeyboardInterrupt:
         return program.interrupted_status()
     except Exception as error:
-        return _fault(error)
+        return _fault(error, "--debug" in words)
     return status
 
 
@@ -98,27 +99,37 @@ def _dispatch(words: list[str]) -> int:
     if name not in VERBS:
         guess = did_you_mean(name, VERBS)
         what = f"there is no verb {name!r}{f'; {guess}' if guess else ''}" if name else "a verb is missing"
-        _complain(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
+        remark(f"{what} (verbs: {', '.join(VERBS)}; env2mjcf --help tells more)")
         return WRONG_USAGE
+    # Imported here, because help and version need neither tyro nor numpy.
+    from .arguments import parse
+
     module, class_name, _ = VERBS[name]
+    kind: type[Verb] = getattr(import_module(f".{module}", __package__), class_name)
     try:
-        verb = parse(getattr(import_module(f".{module}", __package__), class_name), name, words[1:])
+        verb = parse(kind, name, words[1:])
     except SystemExit as ended:  # tyro has printed its help, or what is wrong
         return ended.code if isinstance(ended.code, int) else WRONG_USAGE
+    except ValueError as error:  # options check themselves
+        remark(f"{name}: {error}")
+        return WRONG_USAGE
+    import_module("numpy")  # all verbs need it, and where a signal interrupts its import, another error may come of it
+    program.end_tidily()
     return _run(name, verb)
 
 
 def _version() -> str:
-    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import PackageNotFoundError, version
 
     try:
-        from .. import __version__
+        return version("env2mjcf")
     except PackageNotFoundError:
         return "a checkout that is not installed"
-    return __version__
 
 
 def _run(name: str, verb: Verb) -> int:
+    from ..view.offscreen import RenderError, refuse_unknown
+
     try:
         refuse_unknown()  # or whatever imports MuJoCo would fail
         return verb.run()
@@ -137,7 +148,7 @@ def _run(name: str, verb: Verb) -> int:
         if type(error) is not ValueError and not isinstance(error, RenderError):
             return _fault(error, verb.output.debug)
         _show_traceback(verb.output.debug)
-        _complain(f"{name}: {error}")
+        remark(f"{name}: {error}")
         return WRONG_USAGE
 
 
@@ -146,17 +157,13 @@ def _fault(error: Exception, debug: bool = False) -> int:
     if program.interrupted:
         return program.interrupted_status()
     _show_traceback(debug)
-    _complain(program.describe(error))
+    remark(program.describe(error))
     return FAULT
 
 
 def _show_traceback(debug: bool) -> None:
     if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
         print(printable(traceback.format_exc()), end="", file=sys.stderr)
-
-
-def _complain(message: str) -> None:
-    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
 
 
 def _abandon_stdout() -> None:

@@ -1,17 +1,16 @@
-"""How far a long job is, and how quick: a bar on a terminal, now and then a line in a log.
-
-MERGED: How far planning is: a line on a terminal, now and then one in a log.
-"""
+"""How far a long job is: a bar or a line on a terminal, now and then a line in a log."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.status import Status
 from tqdm import tqdm
+
+from .terminal import console_on, remark
 
 if TYPE_CHECKING:
     from ..planning.result import Progress
@@ -53,40 +52,27 @@ class Meter:
 
     def _line(self) -> None:
         rate = (self._done - self._first) / max(time.monotonic() - self._began, 1e-9)
-        print(f"env2mjcf: {self._done:,} of {self._rows:,} rows, {rate:,.0f} a second", file=sys.stderr)
+        remark(f"{self._done:,} of {self._rows:,} rows, {rate:,.0f} a second")
 
 
-class PlanningMeter:
-    """Shows progress on stderr while it is entered.
+@contextmanager
+def planning_meter(seconds: float) -> Generator[Callable[[Progress], None]]:
+    """Return a function that shows progress on stderr; time is up after so many seconds."""
+    status = console_on(sys.stderr).status("planning") if sys.stderr.isatty() else None
+    shown = 0.0
 
-    Args:
-        seconds: When time is up.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._shown = seconds, 0.0
-        self._status: Status | None = None
-
-    def __enter__(self) -> PlanningMeter:
-        if sys.stderr.isatty():
-            console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False)
-            self._status = console.status("planning")
-            self._status.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._status is not None:
-            self._status.stop()
-
-    def at(self, progress: Progress) -> None:
-        """Show how far planning is."""
+    def show(progress: Progress) -> None:
+        nonlocal shown
         leg = f" leg {progress.leg} of {progress.legs}" if progress.legs > 1 else ""
         line = (
-            f"{progress.doing}{leg}: {progress.seconds:.0f} of {self._seconds:g} s, {progress.checks:,} checks, "
+            f"{progress.doing}{leg}: {progress.seconds:.0f} of {seconds:g} s, {progress.checks:,} checks, "
             f"{progress.motions:,} motions"
         )
-        if self._status is not None:
-            self._status.update(line)
-        elif progress.seconds - self._shown > _INTERVAL:
-            self._shown = progress.seconds
-            print(f"env2mjcf: {line}", file=sys.stderr)
+        if status is not None:
+            status.update(line)
+        elif progress.seconds - shown > _INTERVAL:
+            shown = progress.seconds
+            remark(line)
+
+    with status or nullcontext():
+        yield show

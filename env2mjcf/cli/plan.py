@@ -13,14 +13,12 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..companions.configurations import refuse_without_freedom
 from ..diagnostics import DiagnosticLog
-from ..formats.path import begins_as_path
 from ..options import Options, PathArgument
 from ..system.files import refuse_foreign, refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE, FINDING
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..planning.result import Plan as Result
@@ -52,7 +50,7 @@ class Plan:
     Attributes:
         scene: An env file, an XML environment or a problem XML.
         out: The path file to write; none is written without.
-        planner: Who plans.
+        planner: Which planner; see above.
         time: Seconds after which to give up.
         seed: Of the random numbers; equal seeds give equal paths, unless time runs out.
         resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner;
@@ -60,8 +58,6 @@ class Plan:
         corners: Write just the corners of the path.
         shorten: Make the path shorter.
         task: Which task of the query, counted from 1, where there are several.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -78,9 +74,9 @@ class Plan:
 
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
-        from ..planning.plan_tasks import plan_through
+        from ..formats.path import begins_as_path
         from ..planning.planners import installed
-        from ..simulation.loading import load
+        from ..planning.route import plan_through
 
         # Before anything is loaded and looked at, which may take a minute.
         installed(self.planner)
@@ -91,21 +87,18 @@ class Plan:
                 refuse_foreign(
                     file, "CFG553", "a path file", lambda data: begins_as_path(data.decode("utf-8", "replace"))
                 )
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, self.options)
         query = self._query(scene, log)
         print_diagnostics(log, self.output.verbose)
         if (wrong := _wrong(scene, query)) is not None:
             self._say_wrong(wrong, log)
             return FINDING
-        from .meter import PlanningMeter
+        from .meter import planning_meter
 
-        with PlanningMeter(self.time) as meter:
+        with planning_meter(self.time) as progress:
             result = plan_through(
                 scene, query.q, planner=self.planner, robot=query.robot, time=self.time, seed=self.seed,
-                resolution=self.resolution, shorten=self.shorten, progress=meter.at,
+                resolution=self.resolution, shorten=self.shorten, progress=progress,
             )  # fmt: skip
         written = self._write(scene, query.robot, result)
         if self.output.json:
@@ -121,6 +114,8 @@ class Plan:
             FormatError: Nothing in the scene moves, there is no task, or it has no goal.
             ValueError: There are not so many.
         """
+        from ..companions.configurations import refuse_without_freedom
+
         refuse_without_freedom(scene, self.scene, log)
         tasks = scene.queries
         if not tasks:
@@ -140,10 +135,8 @@ class Plan:
 
         if self.out is None:
             return None
-        out = Path(self.out)
-        if not result.solved:
-            out = _approach(out)
-        q = result.path if self.corners else dense(scene, result)
+        out = Path(self.out) if result.solved else _approach(Path(self.out))
+        q = result.path if self.corners else result.steps(scene)
         return write_path(scene, q, out, robot)
 
     def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
@@ -162,18 +155,9 @@ def _approach(out: Path) -> Path:
     return out.with_name(f"{out.stem}.approach.path")
 
 
-def dense(scene: Scene, result: Result) -> np.ndarray:
-    """Return configurations on the path no farther apart than its resolution, corners included, (n, dim)."""
-    rows = [result.path[:1]]
-    for a, b in zip(result.path[:-1], result.path[1:], strict=True):
-        rows.append(scene.edge_rows(a, b, result.resolution)[1:-1])
-        rows.append(b[None])
-    return np.concatenate(rows)
-
-
 def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | None:
     """Return which configurations of the query are not valid, and why; None if all are."""
-    from ..planning.plan_tasks import names_of
+    from ..planning.route import names_of
 
     names = names_of(len(query.q))
     wrong = [int(i) for i in np.flatnonzero(~scene.valid_rows(query.q))]
@@ -181,10 +165,8 @@ def _wrong(scene: Scene, query: Query) -> list[tuple[str, tuple[str, ...]]] | No
 
 
 def _lines(result: Result, written: Path | None) -> Iterator[Text]:
-    if result.solved:
-        yield Text.assemble(("solved", "bold green"), f" by {result.planner} in {result.seconds:.2f} s")
-    else:
-        yield Text.assemble(("not solved", "bold red"), f" by {result.planner} in {result.seconds:.2f} s")
+    solved = ("solved", "bold green") if result.solved else ("not solved", "bold red")
+    yield Text.assemble(solved, f" by {result.planner} in {result.seconds:.2f} s")
     yield Text(f"checks: {result.checks:,} configurations, {result.checks_per_second:,.0f} a second")
     what = "path" if result.solved else "best approach"
     yield Text(f"{what}: {len(result.path)} configurations, length {result.length:.6g} m")
@@ -203,8 +185,5 @@ def _lines(result: Result, written: Path | None) -> Iterator[Text]:
 
 
 def _summary(scene: Scene, result: Result, written: Path | None) -> dict[str, object]:
-    values: dict[str, object] = {f.name: getattr(result, f.name) for f in dataclasses.fields(result)}
-    values["checks_per_second"] = result.checks_per_second
-    values["dofs"] = scene.space.names
-    values["file"] = written
-    return values
+    values = {f.name: getattr(result, f.name) for f in dataclasses.fields(result)}
+    return {**values, "checks_per_second": result.checks_per_second, "dofs": scene.space.names, "file": written}

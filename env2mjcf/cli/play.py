@@ -14,12 +14,11 @@ from rich.text import Text
 from tqdm import tqdm
 from tyro.conf import Positional
 
-from ..diagnostics import DiagnosticLog
 from ..options import Options
 from ..system.files import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..contact.types import Contact
@@ -53,8 +52,6 @@ class Play:
         ghosts: Draw the way as a line, and robots nearly transparent along it.
         size: Width and height in pixels.
         see_through: Draw obstacles transparent, or --no-see-through: never.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -73,7 +70,6 @@ class Play:
     def run(self) -> int:
         """Write the film, and say what touches in it."""
         from ..companions.configurations import of_file
-        from ..simulation.loading import load
         from ..view.films import encoder, film
         from ..view.shots import checked_size
 
@@ -82,10 +78,7 @@ class Play:
         checked_size(size, least=2)
         refuse_unwritable(self.out, "CFG552")
         options = dataclasses.replace(self.options, query=None)
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, options)
         path = of_file(scene, self.path, self.radians, self.options.limits, log).q
         print_diagnostics(log, self.output.verbose)
         with tqdm(unit="picture", delay=1, leave=False, disable=not sys.stderr.isatty()) as bar:
@@ -100,10 +93,8 @@ class Play:
             )  # fmt: skip
         if self.output.json:
             touching = [sorted({(c.link, c.other) for c in found}) for found in made.touching]
-            print_json(
-                {"film": self.out, "pictures": len(made.q), "fps": made.fps, "configurations": made.q,
-                 "touching": touching, "diagnostics": tuple(log)}
-            )  # fmt: skip
+            facts = {"film": self.out, "pictures": len(made.q), "fps": made.fps, "configurations": made.q}
+            print_json({**facts, "touching": touching, "diagnostics": tuple(log)})
         else:
             print_parts(_lines(made))
         return DONE

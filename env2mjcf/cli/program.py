@@ -1,18 +1,10 @@
-"""What ends the program `env2mjcf`, and how, from its first import on; a library leaves all of that alone.
+"""What the process of the program `env2mjcf` takes over, and its exit statuses; a library leaves all of that alone.
 
-Ctrl-C, SIGTERM and SIGHUP: while numpy is imported they may become an error of another kind, or a traceback; so they
-end the program at once, which has done nothing yet, until there is something that may have to be tidied up.
+Signals: Ctrl-C, SIGTERM and SIGHUP end the program at once until its verb runs, for while numpy is imported they may
+become an error of another kind, or a traceback. Then they raise a KeyboardInterrupt, so that files are tidied up.
 
-
-MERGED: The standard streams of the program, so that none of them can change its exit status for another reason than its own.
-
-One that is closed leads nowhere. What cannot be written to stderr is left out: the results and the status say enough.
-What cannot be written to stdout is an error of its own.
-
-
-MERGED: The exit statuses of the program.
-
-MERGED: What is said of an error that nobody expected.
+Streams: none can change the exit status for another reason than its own. One that is closed leads nowhere. What cannot
+be written to stderr is left out: the results and the status say enough. What cannot be written to stdout is an error.
 """
 
 from __future__ import annotations
@@ -30,6 +22,18 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+DONE = 0
+"""Done, free or valid."""
+FINDING = 1
+"""A collision, an invalid configuration, an error that lint found; never a failure."""
+WRONG_USAGE = 2
+BAD_INPUT = 3
+"""Something cannot be read, or what was asked for cannot be written."""
+FAULT = 4
+"""A fault of env2mjcf, or too little memory, or too many open files."""
+BROKEN_PIPE = 141
+"""What shells report for a program that is stopped by SIGPIPE."""
+
 interrupted = 0
 """The signal that was to end the program: what goes wrong afterwards may go wrong because of it."""
 
@@ -40,18 +44,10 @@ _swallowed = False
 _SOON = 0.05
 
 
-def is_program() -> bool:
-    """Return whether Python was started to run the program; with -m, that is known while it is imported only."""
-    first, words = (sys.argv or [""])[0], sys.orig_argv
-    if first == "-m":
-        return "-m" in words and words[words.index("-m") + 1 :][:1] == ["env2mjcf"]
-    return os.path.basename(first) in ("env2mjcf", "env2mjcf.exe")
-
-
 def begin() -> None:
     """Take this process over, before anything is imported that may fail."""
     global _ours  # noqa: PLW0603  a process has one handler
-    take_over()
+    _take_over_streams()
     sys.excepthook = _end
     # What is ignored, as nohup has it, stays ignored.
     _ours = tuple(s for s in _SIGNALS if signal.getsignal(s) in (signal.default_int_handler, signal.SIG_DFL))
@@ -74,7 +70,7 @@ def end_tidily() -> None:
 
 def interrupted_status() -> int:
     """Return the exit status of a program that was interrupted."""
-    return of_signal(interrupted or signal.SIGINT)
+    return 128 + (interrupted or signal.SIGINT)  # as shells report it
 
 
 def _interrupt(number: int, _frame: FrameType | None) -> None:
@@ -124,7 +120,7 @@ class _Results(io.FileIO):
         try:
             return super().write(data)
         except BrokenPipeError:
-            raise  # whoever reads has seen enough
+            raise  # the reader has seen enough
         except OSError as error:
             raise ResultsError(error.errno, error.strerror) from error
 
@@ -137,13 +133,12 @@ class _Remarks(io.FileIO):
             return memoryview(data).nbytes
 
 
-def take_over() -> None:
-    """Replace the standard streams of this process."""
+def _take_over_streams() -> None:
     # Otherwise the next file that is opened takes a closed one's number, and what libraries print goes into it.
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(handle, True)
     os.close(handle)
-    if os.name == "posix":  # consoles of Windows are no files
+    if os.name == "posix":  # consoles of Windows are not files
         sys.stdout = _over(_Results(1, "w", closefd=False), sys.stdout)
         sys.stderr = _over(_Remarks(2, "w", closefd=False), sys.stderr)
 
@@ -156,28 +151,10 @@ def _over(raw: io.FileIO, before: TextIO | None) -> TextIO:
     return io.TextIOWrapper(io.BufferedWriter(raw), before.encoding, before.errors, line_buffering=at_once)
 
 
-DONE = 0
-"""Done, free or valid."""
-FINDING = 1
-"""A collision, an invalid configuration, an error that lint found; never a failure."""
-WRONG_USAGE = 2
-BAD_INPUT = 3
-"""Something cannot be read, or what was asked for cannot be written."""
-FAULT = 4
-"""A fault of env2mjcf, or too little memory, or too many open files."""
-BROKEN_PIPE = 141
-"""What shells report for a program that is stopped by SIGPIPE."""
-
-
-def of_signal(number: int) -> int:
-    """Return what shells report for a program that is stopped by a signal."""
-    return 128 + number
-
-
 def describe(error: BaseException) -> str:
     """Return a sentence: what the machine lacks, else that env2mjcf is at fault."""
     number = error.errno if isinstance(error, OSError) else None
-    # What is imported says it of a library in words only.
+    # An import that fails for lack of memory says so in words only.
     if isinstance(error, MemoryError) or number == errno.ENOMEM or os.strerror(errno.ENOMEM) in str(error):
         return "there is not enough memory"
     if number in (errno.EMFILE, errno.ENFILE):

@@ -5,21 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
-from ..diagnostics import DiagnosticLog
 from ..options import Options
 from ..system.files import refuse_unwritable
-from .arguments import OptionFlags, Output, OutputFlags, camera_of, keywords, size_of
-from .printing import one_line, print_diagnostics, print_json, print_parts, working
+from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
-    from ..kinematics.transforms import Array
-    from ..simulation.scene import Scene
+    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +43,6 @@ class Render:
         trail: A path file: a line, and robots nearly transparent along it.
         size: Width and height in pixels.
         see_through: Draw obstacles transparent, or --no-see-through: never.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -64,20 +59,20 @@ class Render:
 
     def run(self) -> int:
         """Draw, and say where the picture is."""
-        from ..simulation.loading import load
+        from ..companions.configurations import of_file, of_numbers
         from ..view.pictures import picture
 
         if not self.out.lower().endswith(".png"):
             raise ValueError(f"--out is {self.out}; expected a file that ends in .png")
         camera, size = camera_of(self.camera), size_of(self.size)
         refuse_unwritable(self.out, "CFG552")
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
-        trail = None if self.trail is None else self._trail(scene, log)
+        scene, log = loaded(self.scene, self.options)
+        trail = None if self.trail is None else of_file(scene, self.trail, self.radians, self.options.limits, log).q
         print_diagnostics(log, self.output.verbose)
-        rows = self._rows(scene)
+        if self.config:
+            rows = of_numbers(scene, [str(x) for x in self.config], self.radians).q
+        else:
+            rows = scene.queries[0].q if scene.queries else scene.space.home[None]
         with working("drawing"):
             picture(
                 scene, rows[0], file=self.out, size=size, camera=camera, contacts=self.contacts, ghosts=rows[1:],
@@ -90,15 +85,3 @@ class Render:
             lines = [Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching]
             print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold"), *lines])
         return DONE
-
-    def _rows(self, scene: Scene) -> Array:
-        from ..companions.configurations import of_numbers
-
-        if self.config:
-            return of_numbers(scene, [str(x) for x in self.config], self.radians).q
-        return scene.queries[0].q if scene.queries else scene.space.home[None]
-
-    def _trail(self, scene: Scene, log: DiagnosticLog) -> Array:
-        from ..companions.configurations import of_file
-
-        return np.asarray(of_file(scene, str(self.trail), self.radians, self.options.limits, log).q)

@@ -14,8 +14,8 @@ from ..diagnostics import DiagnosticLog
 from ..limits import LARGEST, Limits
 from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
-from .printing import one_line, print_diagnostics, print_json, print_parts
 from .program import DONE
+from .terminal import counted, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..model.environment import Boundary, Environment
@@ -50,7 +50,6 @@ class Translate:
         box: A boundary for a scene that has none, in file units; dialects C to E must have one.
         strict: Refuse whatever would be lost.
         limits: Bounds on hostile input.
-        output: How to report.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -84,7 +83,8 @@ class Translate:
             log.extend(found)
         print_diagnostics(log, self.output.verbose)
         if self.output.json:
-            print_json({"dialect": self.dialect, **_files(written), "diagnostics": tuple(log)})
+            files = {name: getattr(written, name) for name in ("environment", "robots", "query", "mesh_dirs")}
+            print_json({"dialect": self.dialect, **files, "diagnostics": tuple(log)})
         else:
             print_parts(_lines(result.environment, written))
         return DONE
@@ -106,22 +106,9 @@ class Translate:
         return {"dialect": self.read_as, **{name: getattr(self, name) for name in names}}
 
 
-def _files(written: Written) -> dict[str, Any]:
-    return {
-        "environment": written.environment,
-        "robots": written.robots,
-        "query": written.query,
-        "mesh_dirs": written.mesh_dirs,
-    }
-
-
 def _lines(scene: Environment, written: Written) -> Iterator[Text]:
-    robots, obstacles = len(scene.robots), len(scene.obstacles)
-    yield Text(
-        f"{one_line(str(written.environment))}: dialect {scene.dialect}, {robots} robot{'s' * (robots != 1)}, "
-        f"{obstacles} obstacle{'s' * (obstacles != 1)}",
-        "bold",
-    )
+    bodies = f"{counted(len(scene.robots), 'robot')}, {counted(len(scene.obstacles), 'obstacle')}"
+    yield Text(f"{one_line(str(written.environment))}: dialect {scene.dialect}, {bodies}", "bold")
     for robot in written.robots:
         yield Text(f"{one_line(str(robot))}: a robot")
     if written.query is not None:

@@ -16,9 +16,9 @@ from tyro.conf import Positional
 from ..diagnostics import DiagnosticLog
 from ..options import Options, PathArgument
 from . import program
-from .arguments import OptionFlags, Output, OutputFlags, keywords
-from .printing import one_line, print_diagnostics, print_json, working
+from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE
+from .terminal import loaded, one_line, print_diagnostics, print_json
 
 if TYPE_CHECKING:
     from ..kinematics.transforms import Array
@@ -44,8 +44,6 @@ class View:
         port: Where the page is served; a free port from 8080 on if it is not given.
         browser: Open the page in a browser.
         native: Open MuJoCo's own viewer instead of the page.
-        output: How to report.
-        options: What may be chosen.
     """
 
     scene: Annotated[str, tyro.conf.arg(metavar="SCENE"), Positional]
@@ -67,12 +65,7 @@ class View:
                 raise ValueError("--native plays no path: leave one of --native and --path out")
         else:
             server.require()
-        from ..simulation.loading import load
-
-        with working(f"loading {self.scene}"):
-            scene = load(self.scene, **keywords(self.options))
-        log = DiagnosticLog(self.options.strict)
-        log.extend(scene.diagnostics)
+        scene, log = loaded(self.scene, self.options)
         path = None if self.path is None else self._path(scene, log)
         print_diagnostics(log, self.output.verbose)
         if self.native:
@@ -82,12 +75,12 @@ class View:
 
     def _path(self, scene: Scene, log: DiagnosticLog) -> Array:
         from ..companions.configurations import of_file
-        from ..view.web.playback import doubts
+        from ..view.web.playback import report_doubtful
 
         found = of_file(scene, str(self.path), False, self.options.limits, log)
         if found.graph is not None and found.graph.kind != "path":
             raise ValueError(f"{self.path} is a {found.graph.kind}; --path plays paths")
-        doubts(scene, found.q, str(self.path), log)
+        report_doubtful(scene, found.q, str(self.path), log)
         return found.q
 
     def _serve(self, scene: Scene, path: Array | None, log: DiagnosticLog) -> int:

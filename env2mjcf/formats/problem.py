@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import did_you_mean
 from ..model.environment import Boundary, BoundaryShape, PlannerRules
+from ..options import Options
 from .blocks import read_coordinate
 from .lexer import Scanner
 from .xml import Node
@@ -55,7 +56,7 @@ class Problem:
     boundary: Boundary | None
 
 
-def read_problem(root: Node) -> Problem:
+def read_problem(root: Node, options: Options) -> Problem:
     """Read a `<MotionPlanning>` file.
 
     Raises:
@@ -69,7 +70,7 @@ def read_problem(root: Node) -> Problem:
         environment.get("filename") or environment.get("input_env"),
         robots,
         _read_tasks(where, robots, virtual),
-        _read_rules(root),
+        _read_rules(root, options),
         _read_older_boundary(environment),
     )
 
@@ -140,18 +141,22 @@ def _numbers(scan: Scanner) -> tuple[float, ...]:
     return tuple(numbers)
 
 
-def _read_rules(root: Node) -> PlannerRules:
-    """Read what the collision checkers say about pairs; where several differ, an explicit `true` wins."""
+def _read_rules(root: Node, options: Options) -> PlannerRules:
+    """Read what the collision checkers say about pairs; where several differ, an explicit `true` wins.
+
+    What is reported is what holds: options that are given overrule the file.
+    """
     checkers = list(root.descendants("CollisionDetection"))
     self_flags = [v for c in checkers if (v := _flag(c, "ignoreSelfCollision")) is not None]
     adjacent = [int(v) for c in checkers if (v := _flag(c, "ignoreAdjacentLinks")) is not None]
     adjacent += [_read_links(c, name) for c in checkers for name in _ADJACENT_LINKS if c.get(name) is not None]
     rules = PlannerRules(any(self_flags) if self_flags else None, max(adjacent) if adjacent else None)
     if rules != PlannerRules():
+        overruled = options.self_collision is not None or options.adjacent_links is not None
         message = (
-            "pairs follow the problem file: "
-            f"self-collision {'ignored' if rules.ignore_self_collision else 'tested'}, "
-            f"links within {1 if rules.adjacent_links is None else rules.adjacent_links} connections ignored"
+            f"pairs follow {'options and ' if overruled else ''}the problem file: "
+            f"self-collision {'tested' if options.tests_self(rules.ignore_self_collision) else 'ignored'}, "
+            f"links within {options.untested_steps(rules.adjacent_links)} connections ignored"
         )
         root.log.info("ENV309", "<CollisionDetection>", message, span=checkers[0].span)
     return rules

@@ -8,14 +8,14 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
 from ..kinematics.tree import build_tree, degrees_of_freedom
 from ..limits import Limits
 from ..model.environment import Dialect, Environment, MultiBody, Task
-from ..options import Options, PathArgument
+from ..options import OptionKeywords, Options, PathArgument
 from . import xml_scene
 from .detect import detect, is_xml
 from .env import read_env, read_robot
@@ -37,7 +37,7 @@ class _Named:
     span: Span | None = None
 
 
-def read(path: PathArgument, **options: Any) -> Environment:
+def read(path: PathArgument, **options: Unpack[OptionKeywords]) -> Environment:
     """Read a scene: an env file of any dialect, an XML environment, or the planner's problem XML.
 
     Meshes are not opened, and MuJoCo is not needed.
@@ -66,7 +66,7 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
     if is_xml(source):
         root = parse_xml(source, log)
         if root.tag.lower() in _PROBLEM_TAGS:
-            problem = read_problem(root)
+            problem = read_problem(root, options)
             environment = _problem_environment(problem, source, options, log)
         else:
             environment = _xml_environment(root, options)

@@ -50,6 +50,7 @@ def read_environment(node: Node) -> Environment:
         declared_multibodies=len(multibodies),
         directory=Path(path).parent,
         path=path,
+        xml=True,
     )
     return with_environment_attributes(environment, node)
 

@@ -19,7 +19,7 @@ from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
 from .markup import Element, add, comment_text, numbers, plain, to_text
-from .scenery import add_ground_material, add_scenery, add_settings, add_sky
+from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file
 
 # Attributes of an <Environment> node that concern the planner's own simulation.
 _PHYSICS = ("gravity", "frictionCoefficient")
@@ -123,7 +123,8 @@ def _report_unused(environment: Environment, options: Options, log: DiagnosticLo
         log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
     attributes = dict(environment.attributes)
     for name in _PHYSICS:
-        if name in attributes:
+        followed = name == "gravity" and options.gravity is None and any(gravity_of_file(environment) or ())
+        if name in attributes and not followed:
             message = f"{name}={attributes[name]!r} of the file is the planner's, and is not written"
             hint = "give gravity=(x, y, z) (--gravity)" if name == "gravity" else ""
             log.info("MJC412", name, message, hint=hint)

@@ -9,13 +9,22 @@ import numpy as np
 
 from ..geometry.assembly import Assembly, Part
 from ..kinematics.transforms import Array
-from ..model.environment import Boundary
+from ..model.environment import Boundary, Environment
 from ..options import Options
 from .joints import STANDARD_GRAVITY
 from .markup import Element, add, comment, number, numbers
 
 OVERVIEW = (0.55, -1.0, 0.75)
 """Where the camera `overview` stands, seen from the scene: in front, to the right and above."""
+
+
+def gravity_of_file(environment: Environment) -> tuple[float, float, float] | None:
+    """Return the gravity that an XML file gives, in its own units of length; None where three numbers do not stand."""
+    try:
+        x, y, z = (float(word) for word in dict(environment.attributes).get("gravity", "").split())
+    except ValueError:
+        return None
+    return (x, y, z) if math.isfinite(x + y + z) else None
 
 
 def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:
@@ -39,7 +48,8 @@ def _thickness(part: Part) -> float:
 def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults."""
     add(root, "compiler", angle="radian", autolimits="true", meshdir="assets")
-    step = time_step(assembly, options.gravity)
+    gravity = options.acceleration(gravity_of_file(assembly.environment))
+    step = time_step(assembly, gravity)
     contact = float(f"{2.5 * step:.3g}")
     comment(
         root,
@@ -50,7 +60,7 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
             "filterparent is off: the excludes below are the whole filter.",
         ],
     )
-    option = add(root, "option", timestep=number(step), gravity=numbers(options.gravity), integrator="implicitfast")
+    option = add(root, "option", timestep=number(step), gravity=numbers(gravity), integrator="implicitfast")
     add(option, "flag", filterparent="disable")
     center = (assembly.lower + assembly.upper) / 2
     add(root, "statistic", center=numbers(center), extent=number(assembly.extent))

@@ -313,6 +313,7 @@ class Environment:
         path: The file, as it was named by the caller.
         sources: All files that it was read from, robots and queries, too; nothing that is written replaces one.
         diagnostics: What the readers found.
+        xml: Whether the file that describes the environment is XML.
     """
 
     name: str
@@ -330,6 +331,7 @@ class Environment:
     path: str = field(default="", compare=False)
     sources: tuple[str, ...] = field(default=(), compare=False, repr=False)
     diagnostics: tuple[Diagnostic, ...] = field(default=(), compare=False, repr=False)
+    xml: bool = field(default=False, compare=False)
 
     @property
     def robots(self) -> tuple[MultiBody, ...]:

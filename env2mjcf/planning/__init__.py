@@ -1,4 +1,4 @@
-"""Paths from start to goal, by the planners of OMPL (the extra `planning`) and by one that asks in batches."""
+"""Paths from start to goal, by the planners of OMPL (the extra `planning`) and by one of our own."""
 
 from __future__ import annotations
 

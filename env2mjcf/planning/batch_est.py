@@ -1,4 +1,4 @@
-"""A planner that asks in batches: two trees that grow by small changes of a few degrees of freedom at a time."""
+"""A planner that checks motions in batches: two trees that grow by changes of a few degrees of freedom at a time."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ExpandingRun:
 
     Args:
         space: What moves.
-        validity: Who answers.
+        validity: What tells which motions are valid.
         start: (d,).
         goal: (d,).
         seed: Of the random numbers.

@@ -85,7 +85,7 @@ def state_space(space: PlanningSpace) -> tuple[Any, _Layout]:
 
 
 class _Motions(base.MotionValidator):
-    """Answers about motions, and about states for who asks for those, until there is a reason to stop.
+    """Tells whether motions and states are valid, until there is a reason to stop.
 
     Nothing is raised through OMPL, whose PRM could not clean up behind it (Ctrl-C would end in an abort): an error is
     kept for later, and planning stopped.
@@ -136,7 +136,7 @@ def _never() -> bool:
 
 
 class _States(base.StateValidityChecker):
-    """Answers about states.
+    """Tells whether states are valid.
 
     Python's collector crashes on a `SpaceInformation` of OMPL 2.0.1 whose checker is a function, or OMPL's own.
     """
@@ -155,7 +155,7 @@ class OmplRun:
 
     Args:
         space: What moves.
-        validity: Who answers.
+        validity: What tells which motions are valid.
         planner: One of `OMPL_PLANNERS`.
         start: (d,).
         goal: (d,).
@@ -167,7 +167,7 @@ class OmplRun:
     ) -> None:
         self.name, self.validity = planner, validity
         util.setLogLevel(util.LOG_NONE)
-        # Zero is no seed for OMPL.
+        # OMPL does not take zero.
         util.RNG.setSeed(seed + 1)
         self._space, self._goal = space, goal
         states, self._layout = state_space(space)
@@ -191,7 +191,7 @@ class OmplRun:
     def solve(self, stop: Callable[[], bool]) -> bool:
         """Plan until there is a solution, or until it is to stop; return whether there is one."""
         # The condition itself must not be Python code: PRM asks it in a thread of its own, and would wait forever for
-        # the one that is in here. Whoever asks for a verdict looks at the clock instead.
+        # the one that is in here. The validators, which it calls all the time, look at the clock instead.
         condition = base.plannerNonTerminatingCondition()
         with self._motions.until(stop, condition.terminate):
             self._planner.solve(condition)

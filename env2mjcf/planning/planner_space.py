@@ -1,7 +1,4 @@
-"""The degrees of freedom that a planner moves: their topology, their limits, and how far apart configurations are.
-
-MERGED: Which configurations and motions are valid, and how many configurations were looked at to know it.
-"""
+"""What a planner moves: the topology, limits and distances of its degrees of freedom, and which motions are valid."""
 
 from __future__ import annotations
 
@@ -58,7 +55,6 @@ class PlanningSpace:
 
     Attributes:
         columns: (d,) which degrees of freedom move.
-        names: Their names.
         pieces: What the space is made of.
         lower, upper: (d,) finite limits of what is drawn.
         turns: (d,) which are circles.
@@ -70,7 +66,6 @@ class PlanningSpace:
         space = scene.space
         self.columns = columns
         self.extent = scene.extent
-        self.names = tuple(space.names[c] for c in columns)
         self.turns: NDArray[np.bool_] = space.periodic[columns]
         lower, upper = space.sample_limits
         inside = rows[:, columns]

@@ -1,7 +1,4 @@
-"""The names of the planners.
-
-MERGED: Several planners that take turns, until one of them is done.
-"""
+"""The planners: their names, what each can do, and several of them in turn until one is done."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from ..errors import did_you_mean
 from ..kinematics.transforms import Array
 from .planner_space import PlanningSpace, Validity
 
-# The names that are asked for, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
+# Their names here, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed
 # RRT*) cannot have one with circles for angles.
 OMPL_PLANNERS = {
     "RRTConnect": "RRTConnect",
@@ -28,7 +25,7 @@ OMPL_PLANNERS = {
     "BFMT": "BFMT",
 }
 BATCH = "BatchEST"
-"""The planner of our own, which asks in batches."""
+"""Our own planner, which checks motions in batches."""
 
 AUTO = ("RRTConnect", BATCH)
 """The planners that `auto` lets take turns: the quick one, and one for narrow places."""
@@ -39,12 +36,12 @@ OPTIMISING = ("RRTstar", "PRMstar")
 PLANNERS = ("auto", *OMPL_PLANNERS, BATCH)
 
 
-def known(name: str) -> str:
+def installed(name: str) -> str:
     """Return the name of a planner as it is listed, whatever its case; OMPL's own names will do.
 
     Raises:
-        TypeError: It is no word.
-        ValueError: There is no such planner; the message lists all.
+        TypeError: It is not a word.
+        ValueError: There is no such planner (the message lists all), or OMPL is not installed.
     """
     if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise TypeError(f"planner is {name!r}; expected one of {', '.join(PLANNERS)}")
@@ -54,19 +51,9 @@ def known(name: str) -> str:
         raise ValueError(
             f"there is no planner {name!r}{f'; {guess}' if guess else ''} (planners: {', '.join(PLANNERS)})"
         )
-    return spelled[name.lower()]
-
-
-def installed(name: str) -> str:
-    """Return the name of a planner as it is listed; see `known`.
-
-    Raises:
-        ValueError: There is no such planner, or OMPL is not installed.
-    """
-    spelled = known(name)
     if find_spec("ompl") is None:
-        raise ValueError(f"planner {spelled} needs one more package: pip install 'env2mjcf[planning]'")
-    return spelled
+        raise ValueError(f"planner {spelled[name.lower()]} needs one more package: pip install 'env2mjcf[planning]'")
+    return spelled[name.lower()]
 
 
 # The first turn of each planner, in checks; every round doubles it. Counted in checks and not in seconds, turns are the
@@ -85,20 +72,19 @@ class Run(Protocol):
 
     def path(self) -> Array | None:
         """Return the solution, or else the way to what came nearest to the goal, (k, d); None without any."""
-        ...
 
 
-class Counted(Run, Protocol):
-    """One that tells how much it has looked at."""
+class CountedRun(Run, Protocol):
+    """A planner that tells how much it has looked at."""
 
     validity: Validity
 
 
-class Turns:
+class RoundRobin:
     """Planners that take turns.
 
     Attributes:
-        name: Who has found the solution; before that, who takes turns.
+        name: The planner that has found the solution; before that, all of them.
 
     Args:
         runs: Planners for the same start and goal.
@@ -106,7 +92,7 @@ class Turns:
         goal: (d,).
     """
 
-    def __init__(self, runs: Sequence[Counted], space: PlanningSpace, goal: Array) -> None:
+    def __init__(self, runs: Sequence[CountedRun], space: PlanningSpace, goal: Array) -> None:
         self._runs, self._space, self._goal = runs, space, goal
         self._solved: Run | None = None
         self.name = " and ".join(run.name for run in runs)

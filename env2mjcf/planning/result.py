@@ -1,18 +1,17 @@
-"""What planning ends with.
-
-MERGED: How long planning may take, and who wants to know how far it is.
-"""
+"""What planning ends with, how far it is, and how long it may take."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kinematics.transforms import Array
+from ..simulation.scene import Scene
 from .planner_space import Validity
 
 
@@ -26,7 +25,7 @@ class Plan:
             degrees of freedom. Not solved: the best approach, from the start to what came nearest to the goal.
         certified: (k - 1,) for each edge, whether it is proved that nothing touches on it (`Scene.edge_is_free`).
         dense: (k - 1,) for each edge, whether everything on it is valid at steps of `fine_step`.
-        planner: Who found it, or looked for it; several where legs differ.
+        planner: The planner that found it, or looked for it; several where legs differ.
         seconds: How long it took, shortening and proofs included.
         checks: How many configurations were looked at; proofs, which look at distances, are not counted.
         length: Of the path: metres of a base, and how far a point of a robot moves, at most, by every other degree of
@@ -55,6 +54,13 @@ class Plan:
         """How many configurations were looked at in a second."""
         return self.checks / max(self.seconds, 1e-9)
 
+    def steps(self, scene: Scene) -> Array:
+        """Return configurations on the path no farther apart than `resolution`, corners included, (n, dim)."""
+        edges = [scene.edge_rows(a, b, self.resolution)[1:] for a, b in pairwise(self.path)]
+        for rows, corner in zip(edges, self.path[1:], strict=True):
+            rows[-1] = corner
+        return np.concatenate([self.path[:1], *edges])
+
 
 @dataclass(frozen=True, slots=True)
 class Progress:
@@ -81,7 +87,7 @@ class Progress:
 _INTERVAL = 0.2
 
 
-class Watch:
+class Timekeeper:
     """Tells planners when to stop, reports now and then, and adds up what was checked.
 
     Args:

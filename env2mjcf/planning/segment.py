@@ -1,12 +1,9 @@
-"""One leg, from a start to a goal: found, mended where it passes over something, shortened, proved.
-
-MERGED: Makes paths shorter: first without detours over single configurations, then by random short cuts.
-"""
+"""One segment of a path, from a start to a goal: found, mended where it passes over something, shortened, proved."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import pairwise
 
@@ -17,8 +14,8 @@ from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
 from .batch_est import ExpandingRun
 from .planner_space import PlanningSpace, Validity
-from .planners import AUTO, BATCH, OPTIMISING, Counted, Run, Turns
-from .result import Watch
+from .planners import AUTO, BATCH, OPTIMISING, CountedRun, RoundRobin, Run
+from .result import Timekeeper
 
 # How much finer than the planner's steps those are that a solution is checked at.
 _FINER = 50
@@ -33,8 +30,8 @@ _OPTIMISING = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LegResult:
-    """The way of one leg, (k, d), in the words of `Plan`."""
+class Segment:
+    """What was found for one segment, its path (k, d), in the words of `Plan`."""
 
     solved: bool
     planner: str
@@ -46,10 +43,11 @@ class LegResult:
     fine_step: float
 
 
-class Leg:
-    """Plans one leg.
+@dataclass(slots=True)
+class SegmentPlanner:
+    """Plans one segment.
 
-    Args:
+    Attributes:
         scene: The scene.
         space: What moves.
         planner: Name of the planner.
@@ -59,32 +57,34 @@ class Leg:
         shorten: Whether to make paths shorter.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        space: PlanningSpace,
-        planner: str,
-        resolution: float,
-        seeds: np.random.SeedSequence,
-        watch: Watch,
-        shorten: bool,
-    ) -> None:
-        self._scene, self._space, self._planner = scene, space, planner
-        self._resolution, self._seeds, self._watch, self._shorten = resolution, seeds, watch, shorten
-        # Who has found, or looked for, the path; not for the details of mending it.
-        self._by = planner
-        self._fine = watch.counts(Validity(scene, space, resolution / _FINER))
+    scene: Scene
+    space: PlanningSpace
+    planner: str
+    resolution: float
+    seeds: np.random.SeedSequence
+    watch: Timekeeper
+    shorten: bool
+    # The planner that has found, or looked for, the path; not the one that mended a detail of it.
+    _by: str = field(init=False)
+    _fine: Validity = field(init=False)
 
-    def plan(self, start: Array, goal: Array) -> LegResult:
+    def __post_init__(self) -> None:
+        self._by = self.planner
+        self._fine = self.watch.counts(Validity(self.scene, self.space, self.resolution / _FINER))
+
+    def plan(self, start: Array, goal: Array) -> Segment:
         """Return a way from start to goal, (d,) each, both valid; or the best approach."""
-        resolution, best = self._resolution, np.stack([start])
-        while not self._watch.stop():
-            self._watch.doing = "planning"
-            run = self._run(self._planner, start, goal, resolution)
-            found, way = _searched(run, start, goal, self._patience())
+        resolution, best = self.resolution, np.stack([start])
+        while not self.watch.stop():
+            self.watch.doing = "planning"
+            run = self._run(self.planner, start, goal, resolution)
+            # A planner that never stops by itself leaves time for the rest.
+            optimising = self.planner in OPTIMISING
+            stop = self.watch.stop_within(_OPTIMISING * self.watch.left) if optimising else self.watch.stop
+            found, way = _searched(run, start, goal, stop)
             self._by = run.name
             if found is None:
-                best = min(best, way, key=lambda p: self._space.distance(p[-1], goal))
+                best = min(best, way, key=lambda p: self.space.distance(p[-1], goal))
                 break
             good = self._mended(found, resolution)
             if good is not None:
@@ -92,23 +92,17 @@ class Leg:
             resolution /= 4
         return self._result(best, goal, resolution, solved=False)
 
-    def _patience(self) -> Callable[[], bool]:
-        """Return when a planner is to stop: one that never would by itself leaves time for the rest."""
-        if self._planner in OPTIMISING:
-            return self._watch.stop_within(_OPTIMISING * self._watch.left)
-        return self._watch.stop
-
     def _run(self, planner: str, start: Array, goal: Array, resolution: float) -> Run:
-        seed = int(self._seeds.spawn(1)[0].generate_state(1)[0] >> 1)
-        runs: list[Counted] = []
+        seed = int(self.seeds.spawn(1)[0].generate_state(1)[0] >> 1)
+        runs: list[CountedRun] = []
         for name in AUTO if planner == "auto" else (planner,):
-            validity = self._watch.counts(Validity(self._scene, self._space, resolution))
-            runs.append(_run(name, self._space, validity, start, goal, seed))
-        return runs[0] if len(runs) == 1 else Turns(runs, self._space, goal)
+            validity = self.watch.counts(Validity(self.scene, self.space, resolution))
+            runs.append(_run(name, self.space, validity, start, goal, seed))
+        return runs[0] if len(runs) == 1 else RoundRobin(runs, self.space, goal)
 
     def _mended(self, path: Array, resolution: float) -> Array | None:
         """Return the path with detours where edges are not good; None where there is no quick one."""
-        self._watch.doing = "proving"
+        self.watch.doing = "proving"
         good = [self._good(a, b) for a, b in pairwise(path)]
         pieces, first = [path[:1]], 0
         while first < len(good):
@@ -129,17 +123,17 @@ class Leg:
             return nudged
         start, goal = stretch[0], stretch[-1]
         run = self._run("RRTConnect", start, goal, resolution / _MENDING)
-        found, _ = _searched(run, start, goal, self._watch.stop_within(_MENDING_SECONDS))
+        found, _ = _searched(run, start, goal, self.watch.stop_within(_MENDING_SECONDS))
         if found is not None and all(self._good(a, b) for a, b in pairwise(found)):
             return found
         return stretch if all(self._fine.motion(a, b) for a, b in pairwise(stretch)) else None
 
     def _nudged(self, stretch: Array) -> Array | None:
         """Return a way through one point near what lies between the ends, farther and farther from it."""
-        rng, space = np.random.default_rng(self._seeds.spawn(1)[0]), self._space
+        rng, space = np.random.default_rng(self.seeds.spawn(1)[0]), self.space
         start, goal = stretch[0], stretch[-1]
         for size in np.geomspace(*_NUDGES) * space.extent:
-            if self._watch.stop():
+            if self.watch.stop():
                 break
             if len(stretch) == 2:
                 point = start + rng.random() * space.difference(start, goal)
@@ -155,24 +149,24 @@ class Leg:
         return self._fine.motion(start, end) and bool(self._certified(np.stack([start, end]))[0])
 
     def _certified(self, path: Array) -> NDArray[np.bool_]:
-        rows = self._space.full(path)
-        return np.asarray(self._scene.edge_is_free(rows[:-1], rows[1:], threads=1))
+        rows = self.space.full(path)
+        return np.asarray(self.scene.edge_is_free(rows[:-1], rows[1:], threads=1))
 
-    def _finished(self, path: Array, goal: Array, resolution: float) -> LegResult:
-        if self._shorten:
-            self._watch.doing = "shortening"
-            rng = np.random.default_rng(self._seeds.spawn(1)[0])
-            stop = self._watch.stop_within(_CUTTING_SECONDS)
-            path = shortened(path, self._space, self._good, rng, _CUTS, stop)
+    def _finished(self, path: Array, goal: Array, resolution: float) -> Segment:
+        if self.shorten:
+            self.watch.doing = "shortening"
+            rng = np.random.default_rng(self.seeds.spawn(1)[0])
+            stop = self.watch.stop_within(_CUTTING_SECONDS)
+            path = shortened(path, self.space, self._good, rng, _CUTS, stop)
         return self._result(path, goal, resolution, solved=True)
 
-    def _result(self, path: Array, goal: Array, resolution: float, *, solved: bool) -> LegResult:
+    def _result(self, path: Array, goal: Array, resolution: float, *, solved: bool) -> Segment:
         # An approach is worth no more than a look in the planner's own steps.
-        look = self._fine if solved else self._watch.counts(Validity(self._scene, self._space, resolution))
+        look = self._fine if solved else self.watch.counts(Validity(self.scene, self.space, resolution))
         dense = np.array([look.motion(a, b) for a, b in pairwise(path)], dtype=bool)
         certified = self._certified(path) & dense
-        left = 0.0 if solved else self._space.distance(path[-1], goal)
-        return LegResult(
+        left = 0.0 if solved else self.space.distance(path[-1], goal)
+        return Segment(
             solved and bool(dense.all()), self._by, path, certified, dense, left, resolution, look.resolution
         )
 
@@ -189,7 +183,7 @@ def _searched(run: Run, start: Array, goal: Array, stop: Callable[[], bool]) -> 
     return (path if found else None), path
 
 
-def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> Counted:
+def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> CountedRun:
     if planner == BATCH:
         return ExpandingRun(space, validity, start, goal, seed)
     # Imported here, because OMPL is an extra.

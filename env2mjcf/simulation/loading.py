@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Unpack
 
 from ..contact.exact.engine import require
 from ..contact.types import Contact, deepest
 from ..diagnostics import DiagnosticLog
-from ..model.environment import Dialect
-from ..options import Options, PathArgument
+from ..model.environment import Dialect, Environment
+from ..options import OptionKeywords, Options, PathArgument
 from ..pipeline import Compiled, compile_scene, recompile
 from .mujoco_model import load_model
 from .scene import Scene
 
 
-def load(path: PathArgument, **options: Any) -> Scene:
+def load(path: PathArgument, **options: Unpack[OptionKeywords]) -> Scene:
     """Load a scene into MuJoCo; nothing is written.
 
     Args:
@@ -34,11 +34,11 @@ def load(path: PathArgument, **options: Any) -> Scene:
     return prepare(path, chosen, DiagnosticLog(chosen.strict))
 
 
-def prepare(path: PathArgument, options: Options, log: DiagnosticLog) -> Scene:
-    """Load a scene with options already checked; see `load`."""
+def prepare(source: PathArgument | Environment, options: Options, log: DiagnosticLog) -> Scene:
+    """Load a file, or what was read from it with the same log, with options already checked; see `load`."""
     if options.engine == "exact":
         require()
-    compiled = compile_scene(path, options, log)
+    compiled = compile_scene(source, options, log)
     scene = _scene(compiled, log)
     # One look is not worth compiling the exact engine for.
     touching = deepest(scene.contacts(scene.space.home, engine="mujoco")) if scene.link_names else ()

@@ -1,4 +1,4 @@
-"""Imports that wait: public names that are loaded when they are first used, and work for when a package is."""
+"""Imports that wait: public names that are loaded when they are first used, and work that waits for a package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec
+from itertools import dropwhile
 from types import ModuleType
 from typing import Any, cast
 
@@ -43,16 +44,17 @@ def after_import(name: str, work: Callable[[ModuleType], None]) -> None:
 
     Args:
         name: The module's full name.
-        work: What to do; handed the module.
+        work: What to do; called with the module.
     """
-    if name in sys.modules:
-        work(sys.modules[name])
+    # A name that may not be imported stands there as None.
+    if sys.modules.get(name) is not None:
+        work(import_module(name))  # waits where another thread is still importing it
     else:
-        sys.meta_path.insert(0, _Watch(name, work))
+        sys.meta_path.insert(0, _Finder(name, work))
 
 
-class _Watch(MetaPathFinder):
-    """Finds one module as Python does, and sees to it that something is done behind its code."""
+class _Finder(MetaPathFinder):
+    """Finds one module as Python does, and has work done once its code has run."""
 
     def __init__(self, name: str, work: Callable[[ModuleType], None]) -> None:
         self._name, self._work = name, work
@@ -62,9 +64,11 @@ class _Watch(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname != self._name:
             return None
-        spec = PathFinder.find_spec(fullname, path, target)
+        # Those before it have been asked already; one of them may wait for the same module, and ask this one.
+        others = list(dropwhile(lambda finder: finder is not self, list(sys.meta_path)))[1:]
+        spec = next((s for finder in others if (s := finder.find_spec(fullname, path, target)) is not None), None)
         if spec is not None and spec.loader is not None:
-            spec.loader = _Working(spec.loader, self._finish)
+            spec.loader = _Loader(spec.loader, self._finish)
         return spec
 
     def _finish(self, module: ModuleType) -> None:
@@ -73,7 +77,7 @@ class _Watch(MetaPathFinder):
         self._work(module)
 
 
-class _Working(Loader):
+class _Loader(Loader):
     """Loads a module as its own loader does, then works on it."""
 
     def __init__(self, loader: Loader, work: Callable[[ModuleType], None]) -> None:
@@ -87,5 +91,8 @@ class _Working(Loader):
 
     def exec_module(self, module: ModuleType) -> None:
         self._loader.exec_module(module)
-        cast("Any", module.__spec__).loader = module.__loader__ = self._loader
+        own = self._loader
+        while isinstance(own, _Loader):
+            own = own._loader
+        cast("Any", module.__spec__).loader = module.__loader__ = own
         self._work(module)

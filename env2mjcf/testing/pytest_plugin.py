@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import pytest
 
 if TYPE_CHECKING:
     from env2mjcf import Options, Scene
+    from env2mjcf.options import OptionKeywords
 
 # What env2mjcf.testing reads (PICTURES_VARIABLE there); xdist's workers are configured with the same options.
 _PICTURES = "ENV2MJCF_PICTURES"
@@ -46,7 +47,7 @@ def load_scene() -> Callable[..., Scene]:
 
     scenes: dict[tuple[str, Options], Scene] = {}
 
-    def load_scene(path: str | os.PathLike[str], **options: Any) -> Scene:
+    def load_scene(path: str | os.PathLike[str], **options: Unpack[OptionKeywords]) -> Scene:
         key = (os.path.abspath(path), Options.from_keywords(options))
         if key not in scenes:
             scenes[key] = load(path, **options)

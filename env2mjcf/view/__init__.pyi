@@ -1,7 +1,7 @@
+from .cameras import Direction as Direction
+from .cameras import Viewpoint as Viewpoint
 from .films import Film as Film
 from .films import film as film
-from .framing import Direction as Direction
-from .framing import Viewpoint as Viewpoint
 from .marks import Points as Points
 from .marks import Polyline as Polyline
 from .offscreen import RenderError as RenderError

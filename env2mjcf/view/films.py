@@ -1,7 +1,4 @@
-"""Films of robots that follow a path.
-
-MERGED: Writes pictures one after the other as a film.
-"""
+"""Films of robots that follow a path: what each picture shows, and how pictures become an .mp4 or .gif file."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.files import output
-from .framing import Camera, Viewpoint
+from .cameras import Camera, Viewpoint
 from .marks import TRAIL, Polyline
 from .offscreen import RenderError, read_exactly
 from .pictures import touched, trail_marks
@@ -100,7 +97,11 @@ def film(
     """
     encode = encoder(file, fps)
     width, height = (n // 2 * 2 for n in checked_size(size, least=2))  # films of odd sizes play nowhere
-    length = _duration(scene, path) if seconds is None else positive("seconds", seconds)
+    if seconds is None:
+        way = paced(scene, path, 2)[1]
+        length = min(max(_SECONDS_PER_EXTENT * way / scene.extent, _SHORTEST), _LONGEST)
+    else:
+        length = positive("seconds", seconds)
     if length * fps > _MOST_PICTURES:
         raise ValueError(
             f"seconds is {length:g}, at {fps} pictures a second; expected a film of at most {_MOST_PICTURES} pictures"
@@ -110,17 +111,12 @@ def film(
     touching = tuple(tuple(scene.contacts(row)) for row in q)
     ways = reference_points(scene, q) if ghosts else np.zeros((0, count, 3))
     frames = [_frame(row, ways[:, _thinned(i + 1)], touching[i]) for i, row in enumerate(q)]
-    marks = tuple(_ahead(mark) for mark in trail_marks(scene, path)) if ghosts else ()
+    marks = tuple(Polyline(mark.points, TRAIL, _AHEAD) for mark in trail_marks(scene, path)) if ghosts else ()
     shades = paced(scene, path, _GHOSTS)[0] if ghosts else np.zeros((0, scene.space.dim))
     shot = Shot(scene, frames, (width, height), camera, shades, marks, see_through)
-    with taken(shot) as (answer, stream), output(file, "CFG552") as beside:
+    with taken(shot) as (choice, stream), output(file, "CFG552") as beside:
         encode(beside, _pictures(stream, width, height, count, advance), fps)
-    return Film(Path(os.fsdecode(file)), q, fps, touching, answer.camera)
-
-
-def _duration(scene: Scene, path: ArrayLike) -> float:
-    length = paced(scene, path, 2)[1]
-    return min(max(_SECONDS_PER_EXTENT * length / scene.extent, _SHORTEST), _LONGEST)
+    return Film(Path(os.fsdecode(file)), q, fps, touching, choice.camera)
 
 
 def _thinned(count: int) -> NDArray[np.int64]:
@@ -133,10 +129,6 @@ def _frame(q: Array, ways: Array, contacts: Sequence[Contact]) -> Frame:
     names, arrows = touched(contacts)
     behind = [Polyline(way, TRAIL, _BEHIND) for way in ways if np.ptp(way, axis=0).any()]
     return Frame(q, names, (*behind, *arrows))
-
-
-def _ahead(mark: Polyline) -> Polyline:
-    return Polyline(mark.points, TRAIL, _AHEAD)
 
 
 def _pictures(
@@ -166,7 +158,7 @@ def encoder(file: str | os.PathLike[str], fps: int) -> Encode:
         fps: Pictures per second.
 
     Raises:
-        TypeError: fps is no whole number.
+        TypeError: fps is not a whole number.
         ValueError: The name ends in something else than .mp4 or .gif, or such a film cannot be so quick.
         RenderError: What writes such a film is not installed.
     """
@@ -235,10 +227,7 @@ def _gif(file: Path, pictures: Pictures, fps: int) -> None:
     ends = [round(100 * (i + 1) / fps) * 10 for i in range(len(rest) + 1)]
     steps = [b - a for a, b in pairwise([0, *ends])]
     steps[-1] += 1000  # the end is held before the film begins again
-    first.save(
-        file, format="GIF", save_all=True, append_images=rest, loop=0, optimize=False,
-        duration=steps,
-    )  # fmt: skip
+    first.save(file, format="GIF", save_all=True, append_images=rest, loop=0, optimize=False, duration=steps)
 
 
 _ENCODERS: dict[str, tuple[Encode, str]] = {".mp4": (_mp4, "imageio_ffmpeg"), ".gif": (_gif, "PIL")}

@@ -1,4 +1,4 @@
-"""MuJoCo's own viewer, for those who sit before a screen."""
+"""MuJoCo's own viewer, for those who sit before a screen; apart, because `mujoco.viewer` opens GL when imported."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""One picture of a scene.
-
-MERGED: Which body each pixel of a picture shows.
-"""
+"""One picture of a scene, and which body each of its pixels shows."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..contact.types import Contact
 from ..simulation.scene import Scene
 from ..system.files import output
-from .framing import Camera, Viewpoint
+from .cameras import Camera, Viewpoint
 from .marks import BAD, Arrows, Mark, Points, Polyline
 from .offscreen import RenderError, read_exactly
 from .shots import Frame, Shot, checked_size, taken
@@ -78,9 +75,8 @@ def picture(
         lines += trail_marks(scene, trail)
         shades = np.concatenate([shades, paced(scene, trail, _GHOSTS)[0]])
     touching, arrows = touched(scene.contacts(row)) if contacts else (frozenset[str](), ())
-    shot = Shot(
-        scene, [Frame(row, touching, arrows)], (width, height), camera, shades, tuple(lines), see_through
-    )  # fmt: skip
+    frame = Frame(row, touching, arrows)
+    shot = Shot(scene, [frame], (width, height), camera, shades, tuple(lines), see_through)
     with taken(shot) as (_, stream):
         data = read_exactly(stream, width * height * 3)
     pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 3)
@@ -168,9 +164,9 @@ def segmentation(
     row = scene.space.home if q is None else scene.space.check(q)
     width, height = checked_size(size)
     shot = Shot(scene, [Frame(row)], (width, height), camera, see_through=False, segmentation=True, only=chosen)
-    with taken(shot) as (answer, stream):
+    with taken(shot) as (choice, stream):
         geoms = np.frombuffer(read_exactly(stream, width * height * 4), dtype=np.int32).reshape(height, width)
     label_of = np.full(scene.model.ngeom + 1, -1, dtype=np.int32)
     for i, name in enumerate(names):
         label_of[scene.model.geom(f"{name}:visual").id] = i
-    return Segmentation(label_of[geoms], names, answer.camera)
+    return Segmentation(label_of[geoms], names, choice.camera)

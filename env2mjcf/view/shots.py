@@ -21,7 +21,7 @@ from ..kinematics.tree import DofKind
 from ..mjcf.scenery import boundary_lines
 from ..options import whole
 from ..simulation.scene import Scene
-from .framing import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
+from .cameras import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
 from .offscreen import RenderError, drawn
 
@@ -76,7 +76,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Choice:
     """What the process that draws has chosen.
 
     Attributes:
@@ -92,7 +92,7 @@ def checked_size(size: object, least: int = 1) -> tuple[int, int]:
     """Return the width and height of a picture in pixels.
 
     Raises:
-        TypeError: It is no pair of whole numbers.
+        TypeError: It is not a pair of whole numbers.
         ValueError: One of them is out of range.
     """
     pair: tuple[object, ...] = tuple(size) if isinstance(size, Iterable) and not isinstance(size, str) else ()
@@ -107,7 +107,7 @@ def checked_size(size: object, least: int = 1) -> tuple[int, int]:
 
 
 @contextmanager
-def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
+def taken(shot: Shot) -> Generator[tuple[Choice, IO[bytes]]]:
     """Draw a shot in a process of its own.
 
     Yields:
@@ -125,7 +125,7 @@ def taken(shot: Shot) -> Generator[tuple[Answer, IO[bytes]]]:
         model = Path(folder) / "scene.mjb"
         _save(shot.scene.model, model)
         with drawn(_request(shot, views, points, model)) as (head, stream):
-            yield Answer(views[head["camera"]], head["see_through"]), stream
+            yield Choice(views[head["camera"]], head["see_through"]), stream
 
 
 def _save(model: mujoco.MjModel, file: Path) -> None:
@@ -215,7 +215,8 @@ def _in_view(shot: Shot) -> Array:
     """Return the points that the camera must see, (n, 3)."""
     assembly = shot.scene.compiled.assembly
     points = [_moved(_vertices(p), p.pose[None]) for p in (*assembly.obstacles, *assembly.surfaces)]
-    rows = _rows(shot)
+    rows = np.stack([frame.q for frame in shot.frames])
+    rows = np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
     poses = shot.scene.link_poses(rows)
     shape = _vertices if len(rows) <= _FEW else _box
     points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(assembly.links)]
@@ -226,12 +227,6 @@ def _in_view(shot: Shot) -> Array:
     wires = np.concatenate([np.zeros((0, 3)), *(np.array(mark.points) for mark in _boundary_marks(shot.scene))])
     near = len(wires) and _diagonal(wires) < _FAR_BOUNDARY * _diagonal(bodies)
     return np.concatenate([bodies, wires]) if near else bodies
-
-
-def _rows(shot: Shot) -> Array:
-    """Return all configurations that are drawn, (n, dim)."""
-    rows = np.stack([frame.q for frame in shot.frames])
-    return np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
 
 
 def _vertices(part: Part) -> Array:

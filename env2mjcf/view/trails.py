@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..geometry.assembly import RobotParts
 from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
 
@@ -26,18 +25,13 @@ def reference_points(scene: Scene, q: ArrayLike) -> Array:
     points: list[Array] = []
     first = 0
     for robot in scene.compiled.assembly.robots:
-        i = _reference_link(robot)
+        i = 0 if any(d.connection is None for d in robot.kinematics.dofs) else len(robot.links) - 1
         used = robot.links[i].mesh.used_vertices
         middle = (used.min(axis=0) + used.max(axis=0)) / 2
         own = poses[:, first + i]
         points.append(own[:, :3, :3] @ middle + own[:, :3, 3])
         first += len(robot.links)
     return np.array(points).reshape(-1, len(poses), 3)
-
-
-def _reference_link(robot: RobotParts) -> int:
-    moves = any(d.connection is None for d in robot.kinematics.dofs)
-    return 0 if moves else len(robot.links) - 1
 
 
 def fine(scene: Scene, path: ArrayLike, parts: int = _PARTS_OF_AN_EDGE) -> Array:
@@ -82,7 +76,7 @@ def paced(scene: Scene, path: ArrayLike, count: int) -> tuple[Array, float]:
     The first and the last are the path's ends. Speed is that of the corner that moves furthest (see `lengths`).
 
     Raises:
-        ValueError: The path is no (k, dim) array of finite numbers, or the count is below 2.
+        ValueError: The path is not a (k, dim) array of finite numbers, or the count is below 2.
     """
     if count < 2:
         raise ValueError(f"{count} configurations; expected at least 2, for both ends")

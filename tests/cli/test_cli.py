@@ -17,7 +17,7 @@ from extras import skip_without
 from env2mjcf import load
 from env2mjcf.cli import info as info_module
 from env2mjcf.cli.main import VERBS, main
-from env2mjcf.cli.printing import format_diagnostic, one_line, plain
+from env2mjcf.cli.terminal import format_diagnostic, one_line, plain
 from env2mjcf.errors import Diagnostic, Severity, Span
 
 ROOT = Path(__file__).parents[2]

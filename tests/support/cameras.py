@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from env2mjcf.view import Viewpoint
-from env2mjcf.view.framing import FIELD_OF_VIEW
+from env2mjcf.view.cameras import FIELD_OF_VIEW
 
 
 def projected(points: np.ndarray, camera: Viewpoint, size: tuple[int, int]) -> np.ndarray:

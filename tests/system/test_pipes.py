@@ -112,9 +112,6 @@ def test_the_user_may_name_a_pipe(tmp_path: Path) -> None:
     assert "1 in collision" in said
 
 
-def test_info_reads_twice_and_says_that_a_pipe_cannot_be(tmp_path: Path) -> None:
+def test_info_reads_once_so_that_a_pipe_will_do(tmp_path: Path) -> None:
     scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
-    status, said = run("info", "/dev/stdin", "--mesh-dirs", tmp_path, data=scene.read_bytes())
-    assert status == 3
-    assert "error ENV104: /dev/stdin cannot be described" in said
-    assert "please report" not in said
+    assert run("info", "/dev/stdin", "--mesh-dirs", tmp_path, data=scene.read_bytes())[0] == 0

@@ -208,7 +208,9 @@ def test_what_is_no_such_file_is_kept(name: str, text: str, scene: Environment, 
     with pytest.raises(env2mjcf.ConversionError) as caught:
         write_environment(scene, out / "new.env")
     assert caught.value.code == "ENV190"
-    assert re.search(rf"{re.escape(name)} is not (an env file|a robot file|a query), and is not replaced", str(caught.value))
+    assert re.search(
+        rf"{re.escape(name)} is not (an env file|a robot file|a query), and is not replaced", str(caught.value)
+    )
     assert caught.value.diagnostic.hint
     assert content(out) == before
 

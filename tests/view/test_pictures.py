@@ -14,7 +14,7 @@ from scenes import MODELS, SCENES, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.view import Direction, Points, Polyline, offscreen, picture, segmentation
-from env2mjcf.view.framing import candidates, fitted
+from env2mjcf.view.cameras import candidates, fitted
 
 needs_gl = pytest.mark.skipif(offscreen.backend() is None, reason=f"no GL: {offscreen.missing()}")
 CORNERS = np.array([[x, y, z, 1] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

@@ -1,7 +1,4 @@
-"""Draws what is in a scene on the web page: bodies, what touches, the way of a path.
-
-MERGED: What surrounds the bodies on the web page: camera, light, background, ground and boundary.
-"""
+"""What the web page shows of a scene: bodies, contacts, the way of a path; camera, light, ground and boundary."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from ...geometry.assembly import Assembly, Part
 from ...kinematics.transforms import Array, quaternion_from_matrix
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
-from ..framing import FIELD_OF_VIEW, fitted, named_direction
+from ..cameras import FIELD_OF_VIEW, fitted, named_direction
 
 if TYPE_CHECKING:
     import viser
@@ -96,10 +93,10 @@ class WebScene:
 
     def _add_mesh(self, index: int, part: Part) -> viser.MeshHandle:
         # Names of files stay out of the tree of the page, in which a slash means something.
+        name, mesh, colour = f"/bodies/{index}", part.mesh, self._colours[part.name]
         return self._server.scene.add_mesh_simple(
-            f"/bodies/{index}", part.mesh.vertices, part.mesh.faces, color=self._colours[part.name], flat_shading=True,
-            side="double",
-        )  # fmt: skip
+            name, mesh.vertices, mesh.faces, color=colour, flat_shading=True, side="double"
+        )
 
     def _add_spheres(self, name: str, places: Array) -> None:
         import trimesh

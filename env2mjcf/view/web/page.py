@@ -1,20 +1,20 @@
-"""The panel of the page: status, buttons, sliders, and the controls of a path.
+"""The panel of the page: status, buttons, sliders and the controls of a path.
 
-Its texts are HTML, in which names out of files are text and nothing else.
+What it says is HTML in which names of files are text and nothing else.
 """
 
 from __future__ import annotations
 
 import html
-import unicodedata
 from typing import TYPE_CHECKING, Protocol
 
 from ...contact.types import Verdict
+from ...errors import one_line
 from ...kinematics.space import ConfigurationSpace
 from ...kinematics.transforms import Array
 from ...simulation.scene import Query, Scene
 from .playback import Track
-from .sliders import Dial, Dials
+from .sliders import Slider, Sliders
 
 if TYPE_CHECKING:
     import viser
@@ -30,31 +30,24 @@ class Controls(Protocol):
 
     def go(self, q: Array) -> None:
         """Show a configuration, (dim,)."""
-        ...
 
-    def turned(self, values: list[float]) -> None:
+    def moved(self, values: list[float]) -> None:
         """Show what the sliders say, in the file's numbers."""
-        ...
 
     def random(self) -> None:
         """Show a valid configuration that is drawn at random."""
-        ...
 
     def see_through(self, wanted: bool) -> None:
         """Make obstacles transparent, or solid again."""
-        ...
 
     def toggle(self) -> None:
         """Play the path, or pause."""
-        ...
 
     def scrub(self, fraction: float) -> None:
         """Show the path at a fraction of its length."""
-        ...
 
     def set_pace(self, speed: float, loop: bool) -> None:
         """Say how fast the path plays, and whether it begins again at its end."""
-        ...
 
 
 class Page:
@@ -62,17 +55,17 @@ class Page:
 
     Args:
         server: The page.
-        dials: The sliders to be.
+        sliders: What they move.
         scene: The scene.
         track: The path, if there is one.
-        controls: Who is told when something is pressed or moved.
+        controls: What is told when something is pressed or moved.
         see_through: Whether obstacles are transparent.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
-        dials: Dials,
+        sliders: Sliders,
         scene: Scene,
         track: Track | None,
         controls: Controls,
@@ -89,7 +82,7 @@ class Page:
         if track is not None:
             self._add_path(track)
         self._sliders: list[viser.GuiSliderHandle[float]] = []
-        for number, robot in enumerate(dials.robots):
+        for number, robot in enumerate(sliders.robots):
             self._add_robot(number, robot)
         with gui.add_folder("View"):
             see = gui.add_checkbox("see through", see_through, hint="Makes obstacles transparent.")
@@ -157,7 +150,7 @@ class Page:
             places.update((f"via {i}", row) for i, row in enumerate(rows[1:-1], 1))
         if len(rows) > 1:
             places["goal"] = rows[-1]
-        group = self._server.gui.add_button_group(as_label(label), list(places))
+        group = self._server.gui.add_button_group(one_line(label), list(places))
         group.on_click(lambda _: self._controls.go(places[group.value]))
 
     def _add_path(self, track: Track) -> None:
@@ -173,26 +166,22 @@ class Page:
             loop.on_update(lambda _: controls.set_pace(_SPEEDS[speed.value], loop.value))
             self._row = gui.add_html(_row_text(0, len(track.q)))
 
-    def _add_robot(self, number: int, dials: tuple[Dial, ...]) -> None:
+    def _add_robot(self, number: int, sliders: tuple[Slider, ...]) -> None:
         gui = self._server.gui
         several = len(self._scene.space.robot_slices) > 1
-        with gui.add_folder(f"Robot{f' {number}' if several else ''}{_units(dials)}"):
-            for dial in dials:
-                hint = f"{dial.name}: {'a length as in the file' if dial.length else dial.unit}; {dial.limits}."
-                ends = dial.low, dial.high, dial.step, dial.low
-                slider = gui.add_slider(dial.label, *ends, disabled=dial.low == dial.high, hint=hint)
-                slider.on_update(self._turned)
-                self._sliders.append(slider)
+        unit = next((f" (angles in {s.unit})" for s in sliders if not s.length), "")
+        with gui.add_folder(f"Robot{f' {number}' if several else ''}{unit}"):
+            for s in sliders:
+                hint = f"{s.name}: {'a length as in the file' if s.length else s.unit}; {s.limits}."
+                still = s.low == s.high
+                handle = gui.add_slider(s.label, s.low, s.high, s.step, s.low, disabled=still, hint=hint)
+                handle.on_update(self._moved)
+                self._sliders.append(handle)
 
-    def _turned(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+    def _moved(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         # Assigning to a slider calls back, too.
         if event.client_id is not None:
-            self._controls.turned(self.values())
-
-
-def _units(dials: tuple[Dial, ...]) -> str:
-    angles = next((d.unit for d in dials if not d.length), "")
-    return f" (angles in {angles})" if angles else ""
+            self._controls.moved(self.values())
 
 
 def _icon(name: str) -> viser.IconName:
@@ -215,15 +204,7 @@ _BOX = "height:9.5em;overflow-y:auto;margin:0.4em 0.8em 0.9em;font-size:0.82em;l
 
 def as_text(name: str) -> str:
     """Return a name fit for HTML: what has a meaning there, turns the direction of text, or is invisible, is shown."""
-    return html.escape(as_label(name), quote=True)
-
-
-def as_label(name: str) -> str:
-    """Return a name fit for what the page shows as text anyway: what turns its direction, or is invisible, is shown."""
-    return "".join(
-        c.encode("unicode_escape").decode("ascii") if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
-        for c in name
-    )
+    return html.escape(one_line(name), quote=True)
 
 
 def status(verdict: Verdict, looking: bool = False) -> str:

@@ -64,7 +64,7 @@ class Track:
         return (int(np.searchsorted(self._far, place, side="right")) - 1) // _PARTS
 
 
-def doubts(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:
+def report_doubtful(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:
     """Report what is doubtful about a path, (k, dim), that somebody wants to see."""
     if len(q) == 1:
         log.warn("CFG551", file, f"{file} holds one configuration; expected a path of two at least")

@@ -30,7 +30,7 @@ def free_port(wish: int | None = None) -> int:
     """Return a port of the loopback interface that nobody listens on: the wished one, else the first from 8080 on.
 
     Raises:
-        ValueError: The wished port is in use, may not be used, or is none.
+        ValueError: The wished port is in use, may not be used, or is not one.
     """
     if wish is None:
         return next(p for p in range(FIRST_PORT, _PORTS.stop) if _is_free(p))
@@ -53,7 +53,7 @@ def serving(port: int, label: str) -> Generator[viser.ViserServer]:
     import viser
 
     class LoopbackServer(viser.ViserServer):
-        """Never asks the service that hands out public addresses, whoever tells it to."""
+        """Never asks the service that hands out public addresses."""
 
         def request_share_url(self, verbose: bool = True) -> None:
             return None

@@ -16,8 +16,8 @@ _STEPS = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Dial:
-    """A degree of freedom as it is turned by hand.
+class Slider:
+    """A degree of freedom as a slider.
 
     Attributes:
         name: Its name in the space.
@@ -39,7 +39,7 @@ class Dial:
     limits: str
 
 
-class Dials:
+class Sliders:
     """All degrees of freedom of a scene as sliders.
 
     Args:
@@ -47,7 +47,7 @@ class Dials:
         rows: (n, dim) configurations that the sliders must be able to show.
 
     Attributes:
-        robots: The dials of each robot, in the order of the space.
+        robots: Those of each robot, in the order of the space.
     """
 
     def __init__(self, scene: Scene, rows: Array) -> None:
@@ -59,8 +59,8 @@ class Dials:
         self._high = space.encode(np.maximum(upper, shown.max(axis=0)))
         self._limits = [space.in_file_units(ends) for ends in space.joint_limits]
         self._steps = np.array([_step(b - a) for a, b in zip(self._low, self._high, strict=True)])
-        self.robots: tuple[tuple[Dial, ...], ...] = tuple(
-            tuple(self._dial(scene, r, i) for i in range(columns.start, columns.stop))
+        self.robots: tuple[tuple[Slider, ...], ...] = tuple(
+            tuple(self._slider(scene, r, i) for i in range(columns.start, columns.stop))
             for r, columns in enumerate(space.robot_slices)
         )
 
@@ -89,7 +89,7 @@ class Dials:
         q = np.where((q < lower) & (q > lower - slack), lower, q)
         return np.where((q > upper) & (q < upper + slack), upper, q)
 
-    def _dial(self, scene: Scene, robot: int, i: int) -> Dial:
+    def _slider(self, scene: Scene, robot: int, i: int) -> Slider:
         parts = scene.compiled.assembly.robots[robot]
         column = i - self._space.robot_slices[robot].start
         length = parts.kinematics.dofs[column].kind.is_length
@@ -100,7 +100,7 @@ class Dials:
         limits = f"limits {bounds[0]} to {bounds[1]}" if np.isfinite(self._limits[0][i]) else "no limits"
         label = name.removeprefix(f"robot{robot}/")
         digits = _digits(step)
-        return Dial(name, label, length, unit, round(low, digits), round(high, digits), step, limits)
+        return Slider(name, label, length, unit, round(low, digits), round(high, digits), step, limits)
 
 
 def _angle_unit(rules: DialectRules) -> str:

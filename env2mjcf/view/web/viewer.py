@@ -1,10 +1,10 @@
-"""The viewer: what is shown, and what may change it."""
+"""The viewer: what is shown, what may change it, and verdicts on it while somebody looks on."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -13,11 +13,10 @@ from ...kinematics.transforms import Array
 from ...options import Engine
 from ...simulation.scene import Scene
 from ..trails import paced, reference_points
-from .newest import Newest
 from .nodes import WebScene, set_stage
 from .page import Page
 from .playback import Player, Track
-from .sliders import Dials
+from .sliders import Sliders
 
 if TYPE_CHECKING:
     import viser
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
 # Draws for one valid configuration before giving up.
 _DRAWS = 2000
 _TRAIL_POINTS = 240
+
+T = TypeVar("T")
 
 
 class Viewer:
@@ -51,7 +52,7 @@ class Viewer:
         self._engine: Engine = "mujoco" if chosen == "auto" else chosen
         shown = [q.q for q in scene.queries] + ([path] if path is not None else [])
         rows = np.vstack([np.zeros((0, scene.space.dim)), *shown])
-        self._dials = Dials(scene, rows)
+        self._sliders = Sliders(scene, rows)
         set_stage(server, scene, rows)
         self._web = WebScene(server, scene)
         self._track = None if path is None else Track(scene, path)
@@ -60,17 +61,17 @@ class Viewer:
         first = self._first(path)
         hidden = _is_enclosed(scene, first)
         self._web.see_through(hidden)
-        self.page = Page(server, self._dials, scene, self._track, self, hidden)
+        self.page = Page(server, self._sliders, scene, self._track, self, hidden)
         if self._track is not None:
             self._player = Player(self._track.seconds, self._tick, self.page.paused)
             self._web.trail(reference_points(scene, paced(scene, self._track.q, _TRAIL_POINTS)[0]))
-        self._newest = Newest[Array](self._explain)
+        self._latest = Latest[Array](self._explain)
         self.q = scene.space.home.copy()
         self.show(first)
 
     def close(self) -> None:
         """End its threads."""
-        self._newest.close()
+        self._latest.close()
         if self._player is not None:
             self._player.close()
 
@@ -80,19 +81,19 @@ class Viewer:
             self.q = q
             with self._server.atomic():
                 self._web.place(self._scene.link_poses(q))
-                self.page.set_values(self._dials.values(q))
-            self._newest.submit(q)
+                self.page.set_values(self._sliders.values(q))
+            self._latest.submit(q)
 
     def go(self, q: Array) -> None:
-        """Show a configuration that a user chose: nothing plays any more."""
+        """Show a configuration that somebody chose; the path stops."""
         with self._lock:
             self.pause()
             self.show(q)
 
-    def turned(self, values: list[float]) -> None:
+    def moved(self, values: list[float]) -> None:
         """Show what the sliders say."""
         with self._lock:
-            q = self._dials.configuration(values)
+            q = self._sliders.configuration(values)
             if q is not None:
                 self.go(q)
 
@@ -147,7 +148,7 @@ class Viewer:
 
     def _tick(self, fraction: float) -> None:
         with self._lock:
-            # After a pause something else may be shown.
+            # What paused it may have shown something else since.
             if self._track is not None and self._player is not None and self._player.playing:
                 self.page.set_fraction(fraction)
                 self.show(self._track.at(fraction))
@@ -179,3 +180,43 @@ def _is_enclosed(scene: Scene, q: Array) -> bool:
         world = part.mesh.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
         boxes.append((world.min(axis=0), world.max(axis=0)))
     return len(places) > 0 and any(bool(np.all((places > low) & (places < high))) for low, high in boxes)
+
+
+class Latest(Generic[T]):
+    """Works on what was handed in last, in a thread of its own; what has been overtaken meanwhile is dropped.
+
+    Args:
+        work: What to do. It is handed a function, too, that says whether something newer waits.
+    """
+
+    def __init__(self, work: Callable[[T, Callable[[], bool]], None]) -> None:
+        self._work = work
+        self._waiting: T | None = None
+        self._changed = threading.Condition()
+        self._closed = False
+        threading.Thread(target=self._run, name="env2mjcf-judge", daemon=True).start()
+
+    def submit(self, item: T) -> None:
+        """Hand in something newer."""
+        with self._changed:
+            self._waiting = item
+            self._changed.notify()
+
+    def close(self) -> None:
+        """End the thread after what it is working on."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+
+    def _overtaken(self) -> bool:
+        return self._waiting is not None or self._closed
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(self._overtaken)
+                if self._closed:
+                    return
+                item, self._waiting = self._waiting, None
+            assert item is not None
+            self._work(item, self._overtaken)

@@ -21,10 +21,9 @@ import env2mjcf
 from env2mjcf import Scene, Verdict
 from env2mjcf.view.web import page as wording
 from env2mjcf.view.web import server as web_server
-from env2mjcf.view.web.newest import Newest
 from env2mjcf.view.web.playback import Player, Track
-from env2mjcf.view.web.sliders import Dials
-from env2mjcf.view.web.viewer import Viewer
+from env2mjcf.view.web.sliders import Sliders
+from env2mjcf.view.web.viewer import Latest, Viewer
 
 ROOT = Path(__file__).parents[3]
 NOTHING = np.zeros((0, 6))
@@ -50,11 +49,11 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_sliders_stand_in_turns_in_dialect_a_and_in_fractions_of_pi_elsewhere() -> None:
     seed = env2mjcf.load(MODELS / "seed" / "seed.env")
-    (dials,) = Dials(seed, np.zeros((0, 9))).robots
+    (dials,) = Sliders(seed, np.zeros((0, 9))).robots
     assert [d.unit for d in dials] == ["lengths"] * 3 + ["turns"] * 6
     assert [(d.low, d.high) for d in dials[3:6]] == [(-0.5, 0.5)] * 3
     two = env2mjcf.load(MODELS / "two-robots" / "two-robots.env")
-    car, turret = Dials(two, np.zeros((0, 6))).robots
+    car, turret = Sliders(two, np.zeros((0, 6))).robots
     assert [(d.label, d.unit) for d in car] == [
         ("car.x", "lengths"),
         ("car.y", "lengths"),
@@ -65,13 +64,13 @@ def test_sliders_stand_in_turns_in_dialect_a_and_in_fractions_of_pi_elsewhere() 
 
 
 def test_a_slider_reaches_what_the_query_holds_beyond_its_limits(arm: Scene) -> None:
-    ((dial,),) = Dials(arm, np.array([[2.0]])).robots
+    ((dial,),) = Sliders(arm, np.array([[2.0]])).robots
     assert dial.low == pytest.approx(-1 / 3, abs=dial.step)
     assert dial.high >= 2.0 / np.pi
 
 
 def test_a_slider_at_its_end_is_within_limits_that_are_no_whole_number_of_steps(arm: Scene) -> None:
-    dials = Dials(arm, np.zeros((0, 1)))
+    dials = Sliders(arm, np.zeros((0, 1)))
     ((dial,),) = dials.robots
     for end in (dial.low, dial.high):
         q = dials.configuration([end])
@@ -84,7 +83,7 @@ def test_a_slider_at_its_end_is_within_limits_that_are_no_whole_number_of_steps(
 
 
 def test_sliders_and_configurations_are_each_other_back(cube: Scene) -> None:
-    dials = Dials(cube, NOTHING)
+    dials = Sliders(cube, NOTHING)
     for q in cube.space.sample(20, 0):
         again = dials.configuration(dials.values(q))
         np.testing.assert_allclose(again, q, rtol=1e-12, atol=1e-12)
@@ -92,7 +91,7 @@ def test_sliders_and_configurations_are_each_other_back(cube: Scene) -> None:
 
 
 def test_an_angle_that_turns_without_end_stays_on_its_slider(cube: Scene) -> None:
-    dials = Dials(cube, NOTHING)
+    dials = Sliders(cube, NOTHING)
     turned = np.array([0, 0, 0, 2 * np.pi, 3 * np.pi, -2.25 * np.pi])
     np.testing.assert_allclose(dials.values(turned)[3:], [0, -1, -0.25], atol=1e-12)
 
@@ -149,7 +148,7 @@ def test_what_has_been_overtaken_is_not_worked_on() -> None:
         if item == 99:
             done.set()
 
-    newest = Newest[int](work)
+    newest = Latest[int](work)
     newest.submit(0)
     assert begun.wait(10)
     for item in range(1, 100):

@@ -1,4 +1,7 @@
-"""Prints names, diagnostics and JSON, so that no file can play tricks on a terminal."""
+"""Results, diagnostics and JSON on a terminal or in a pipe, so that no file can play tricks on a terminal.
+
+rich is imported where it is used: the program's help does without.
+"""
 
 from __future__ import annotations
 
@@ -9,33 +12,22 @@ import logging
 import math
 import re
 import sys
-import unicodedata
 import warnings
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, TYPE_CHECKING, Any
 
-import numpy as np
-from rich.console import Console, RenderableType
-from rich.text import Text
+from ..diagnostics import DiagnosticLog
+from ..errors import Diagnostic, Severity, is_tricky, one_line, printable
 
-from ..errors import Diagnostic, Severity
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+    from ..options import Options
+    from ..simulation.scene import Scene
 
 _COLOURS = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity.INFO: "bold cyan"}
-
-# Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.
-_TRICKY = ("Cc", "Cf", "Cs", "Zl", "Zp")
-
-
-def printable(text: str) -> str:
-    """Return text with control characters escaped; line feeds and tabs stay."""
-    return "".join(_escaped(c) if c not in "\n\t" and unicodedata.category(c) in _TRICKY else c for c in text)
-
-
-def one_line(text: str) -> str:
-    """Return text with every control character escaped."""
-    return "".join(_escaped(c) if unicodedata.category(c) in _TRICKY else c for c in text)
 
 
 def format_diagnostic(diagnostic: Diagnostic) -> str:
@@ -43,7 +35,7 @@ def format_diagnostic(diagnostic: Diagnostic) -> str:
     span = diagnostic.span
     if span is not None:
         # One character stands for one, so that the caret stays under its column.
-        text = "".join("\ufffd" if c != "\t" and unicodedata.category(c) in _TRICKY else c for c in span.text)
+        text = "".join("\ufffd" if c != "\t" and is_tricky(c) else c for c in span.text)
         span = dataclasses.replace(span, path=one_line(span.path), text=text)
     safe = dataclasses.replace(
         diagnostic, message=printable(diagnostic.message), hint=printable(diagnostic.hint), span=span
@@ -72,18 +64,32 @@ def _without_place(message: Warning | str, category: type[Warning], *_: object) 
     return f"{category.__name__}: {message}"
 
 
+def remark(message: str) -> None:
+    """Print a line about the work, not its results, to stderr."""
+    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things, in the plural where there is not one."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def print_parts(parts: Iterable[RenderableType]) -> None:
     """Print results: in colour and as wide as the terminal, or plain, never folded and without trailing blanks."""
-    if sys.stdout.isatty():
-        console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
-        for part in parts:
-            console.print(part)
-        return
-    console = Console(file=io.StringIO(), highlight=False, markup=False, emoji=False, width=10_000, color_system=None)
-    with console.capture() as capture:
-        for part in parts:
-            console.print(part)
-    print("\n".join(line.rstrip() for line in capture.get().splitlines()))
+    on_terminal = sys.stdout.isatty()
+    text = io.StringIO()
+    console = console_on(sys.stdout) if on_terminal else console_on(text, width=10_000, color_system=None)
+    for part in parts:
+        console.print(part)
+    if not on_terminal:
+        print("\n".join(line.rstrip() for line in text.getvalue().splitlines()))
+
+
+def console_on(file: IO[str], **options: Any) -> Console:
+    """Return a console of rich that prints text as it is."""
+    from rich.console import Console
+
+    return Console(file=file, highlight=False, markup=False, emoji=False, **options)
 
 
 @contextmanager
@@ -92,15 +98,25 @@ def working(what: str) -> Generator[None]:
     if not sys.stderr.isatty():
         yield
         return
-    console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False)
-    with console.status(Text(one_line(what), "dim")):
+    from rich.text import Text
+
+    with console_on(sys.stderr).status(Text(one_line(what), "dim")):
         yield
+
+
+def loaded(path: str, options: Options) -> tuple[Scene, DiagnosticLog]:
+    """Load a scene, and say so on a terminal; return a log with its findings, too."""
+    from ..simulation.loading import prepare
+
+    log = DiagnosticLog(options.strict)
+    with working(f"loading {path}"):
+        return prepare(path, options, log), log
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
     """Print diagnostics to stderr; those that are only worth knowing on request."""
     sys.stdout.flush()  # so that results stand before what is said about them
-    console = Console(file=sys.stderr, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    console = console_on(sys.stderr, soft_wrap=True)
     for diagnostic in diagnostics:
         if verbose or diagnostic.severity is not Severity.INFO:
             print_diagnostic(console, diagnostic)
@@ -114,6 +130,8 @@ def print_diagnostic(console: Console, diagnostic: Diagnostic, path: str = "") -
         diagnostic: What to print.
         path: The file to name where the diagnostic has no place of its own.
     """
+    from rich.text import Text
+
     place = f"{one_line(path)}: " if path and diagnostic.span is None else ""
     text = Text(place + format_diagnostic(diagnostic))
     colour = _COLOURS[diagnostic.severity]
@@ -132,8 +150,8 @@ def plain(value: Any) -> Any:
     """Return a value in terms of JSON; what is not finite, which JSON lacks, becomes null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+    if (tolist := getattr(value, "tolist", None)) is not None:  # an array or a number of numpy
+        return plain(tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -141,7 +159,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [plain(v) for v in value]
     return str(value) if isinstance(value, Path) else value
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode("ascii")

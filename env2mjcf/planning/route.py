@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
@@ -16,9 +15,9 @@ from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.locks import Lock
 from .planner_space import PlanningSpace
-from .planners import known
-from .result import Plan, Progress, Watch
-from .segment import Leg, LegResult
+from .planners import installed
+from .result import Plan, Progress, Timekeeper
+from .segment import Segment, SegmentPlanner
 
 # OMPL draws the seeds of all its random numbers from one generator of the process: what two threads plan at once would
 # depend on which of them is quicker.
@@ -61,9 +60,9 @@ def plan(
         progress: Called a few times a second.
 
     Raises:
-        TypeError: planner is no name, or robot, time, seed or resolution no number of the right kind.
+        TypeError: planner is not a name, or robot, time, seed or resolution not a number of the right kind.
         FormatError: The file's PositionRes is too small to plan with.
-        ValueError: Start or goal is no configuration, or not valid with the other robots as they are in `start` (the
+        ValueError: Start or goal is not a configuration, or not valid with the other robots as they are in `start` (the
             message says who touches); there is no such planner or robot, or OMPL is not installed; time, seed or
             resolution is out of range.
     """
@@ -90,29 +89,30 @@ def plan_through(
 
     With `robot`, the others stay as they are in the first configuration.
     """
-    rows, name = scene.space.check(q), known(planner)
+    rows, name = scene.space.check(q), installed(planner)
     _refuse(scene, rows, robot, time, seed)
     step = _step(scene, resolution)
     columns = _columns(scene, robot)
-    rows = _others_as_at_start(rows, columns)
+    # What does not move is in every row as in the first.
+    moved, rows = rows, np.repeat(rows[:1], len(rows), axis=0)
+    rows[:, columns] = moved[:, columns]
     _refuse_invalid(scene, rows)
-    if find_spec("ompl") is None:
-        raise ValueError(f"planner {name} needs one more package: pip install 'env2mjcf[planning]'")
     scene.warm_up()
     space = PlanningSpace(scene, rows, columns)
     with _one_at_a_time:
-        watch = Watch(time, len(rows) - 1, progress)
-        began, results = clock.perf_counter(), list[LegResult]()
+        watch = Timekeeper(time, len(rows) - 1, progress)
+        began, results = clock.perf_counter(), list[Segment]()
         for number, (start, goal) in enumerate(pairwise(rows[:, space.columns]), 1):
             watch.leg = number
-            leg = Leg(scene, space, name, step, np.random.SeedSequence((seed, number)), watch, shorten)
-            results.append(leg.plan(start, goal))
+            seeds = np.random.SeedSequence((seed, number))
+            segment = SegmentPlanner(scene, space, name, step, seeds, watch, shorten)
+            results.append(segment.plan(start, goal))
             if not results[-1].solved:
                 break
         return _joined(space, results, clock.perf_counter() - began, watch.checks, seed)
 
 
-def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks: int, seed: int) -> Plan:
+def _joined(space: PlanningSpace, legs: list[Segment], seconds: float, checks: int, seed: int) -> Plan:
     path = np.concatenate([legs[0].path[:1], *(leg.path[1:] for leg in legs)])
     return Plan(
         solved=legs[-1].solved,
@@ -133,13 +133,6 @@ def _joined(space: PlanningSpace, legs: list[LegResult], seconds: float, checks:
 def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
     every = np.arange(scene.space.dim)
     return every if robot is None else every[scene.space.robot_slices[robot]]
-
-
-def _others_as_at_start(rows: Array, columns: NDArray[np.int64]) -> Array:
-    """Return what the robots go through: in every row, what does not move is as in the first."""
-    stay = np.repeat(rows[:1], len(rows), axis=0)
-    stay[:, columns] = rows[:, columns]
-    return stay
 
 
 def _step(scene: Scene, resolution: float | None) -> float:
