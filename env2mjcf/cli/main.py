@@ -113,7 +113,9 @@ def _dispatch(words: list[str]) -> int:
     except ValueError as error:  # options check themselves
         remark(f"{name}: {error}")
         return WRONG_USAGE
-    import_module("numpy")  # all verbs need it, and where a signal interrupts its import, another error may come of it
+    # The verbs need it and what it loads. Before all else: a signal in the middle of it may come out as another error,
+    # and OpenBLAS never comes back from being loaded where too little memory is left.
+    import_module("trimesh")
     program.end_tidily()
     return _run(name, verb)
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..model.dialects import RULES
 from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
 from .forward import RobotKinematics
-from .transforms import Array, angles_from_quaternion, quaternion_from_angles, wrap
+from .transforms import Array, angles_from_quaternion, quaternion_from_angles, real_array, wrap
 from .tree import POSITIONS, DofKind
 
 # More names than these are not listed in a message.
@@ -37,41 +37,6 @@ class Slot:
     columns: tuple[int, ...]
     address: int
     free: bool
-
-
-def real_array(values: ArrayLike, what: str, names: Sequence[str] = ()) -> Array:
-    """Return finite real numbers as float64: how every array is checked that a public function takes.
-
-    Args:
-        values: The array, or what becomes one.
-        what: What it is called in messages.
-        names: What the entries of its last axis are called.
-
-    Raises:
-        ValueError: It holds text, complex numbers, objects or masked entries, a NaN or an infinity.
-    """
-    if type(values) is np.ndarray and values.dtype == np.float64:
-        array = values
-    else:
-        try:
-            found = np.asarray(values)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{what} is not an array of numbers: {error}") from error
-        rows = values if found.ndim > 1 and isinstance(values, list | tuple) else (values,)
-        if any(isinstance(row, np.ma.MaskedArray) for row in rows):
-            raise ValueError(f"{what} is a masked array; expected plain numbers")
-        if found.dtype.kind not in "biuf":
-            raise ValueError(f"{what} holds values of type {found.dtype}; expected real numbers")
-        array = found.astype(np.float64, copy=False)
-    finite = np.isfinite(array)
-    if not finite.all():
-        where = tuple(np.argwhere(~finite)[0].tolist())
-        subject, row = f"{what} holds", where
-        if where and array.shape[-1] == len(names):
-            subject, row = f"{names[where[-1]]} is", where[:-1]
-        at = f" in row {', '.join(map(str, row))}" if row else ""
-        raise ValueError(f"{subject} {array[where]}{at}; expected a finite number")
-    return array
 
 
 class ConfigurationSpace:

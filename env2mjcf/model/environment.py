@@ -1,7 +1,6 @@
 """The scene as its file describes it: robots, obstacles, boundary, tasks.
 
-Words of the file format stay as they are (`MultiBody`, `FreeBody`, `Connection`, `DHParameters`). Lengths are in file
-units, every angle is in radians. Each value keeps the span it was read from; spans take no part in comparisons.
+Words of the file format stay as they are. Lengths are in file units, angles in radians. Spans are not compared.
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ from ..contact.tasks import Question
 from ..contact.threads import ask, thread_count
 from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
-from ..kinematics.space import ConfigurationSpace, real_array
-from ..kinematics.transforms import Array
+from ..kinematics.space import ConfigurationSpace
+from ..kinematics.transforms import Array, real_array
 from ..model.environment import Environment
 from ..options import Engine
 from ..pipeline import Compiled

@@ -24,6 +24,7 @@ from scenes import box_mesh
 import env2mjcf
 from env2mjcf import ConversionError, FormatError, GeometryError, Roadmap
 from env2mjcf.cli.main import main
+from env2mjcf.errors import one_line
 from env2mjcf.mjcf.markup import comment_text
 from env2mjcf.model.names import file_stem, mesh_stem
 from env2mjcf.view.web import page as wording
@@ -243,7 +244,7 @@ def test_what_libraries_say_is_no_command_either() -> None:
 def test_a_name_on_the_page_is_text(stem: str) -> None:
     shown = wording.as_text(stem)
     assert not set("<>\"'") & set(shown)
-    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), wording.as_label(mesh_stem(f"{stem}.g")))
+    assert_harmless(shown.replace("\ufffe", "").replace("\uffff", ""), one_line(mesh_stem(f"{stem}.g")))
 
 
 # Texts.
