@@ -136,6 +136,7 @@ def run_command(line: int, words: str) -> str:
         "COLUMNS": "100",
         "NO_COLOR": "1",
         "TERM": "dumb",
+        "PYTEST_ADDOPTS": "",
     }
     done = subprocess.run(
         ["bash", "-c", words], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
