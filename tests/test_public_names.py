@@ -428,7 +428,7 @@ def catalogue() -> dict[str, str]:
 
 
 def differences(old: Any, new: Any, path: str) -> Iterator[str]:
-    """Yield what is recorded and is no more, or is another."""
+    """Yield what is recorded and is gone, or is another."""
     if path in CHANGED:
         return
     if isinstance(old, dict) and isinstance(new, dict):
