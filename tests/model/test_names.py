@@ -64,7 +64,7 @@ def _stem(request: pytest.FixtureRequest) -> str:
     return STEMS[request.param]
 
 
-# No text names a file whose name is none.
+# A lone surrogate cannot stand in a text, so no scene can name such a mesh.
 @pytest.fixture(params=[k for k in STEMS if k != "surrogate"], name="mesh")
 def _mesh(request: pytest.FixtureRequest) -> str:
     return STEMS[request.param]
