@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
-from ..geometry.orientation import winding_numbers
+from ..geometry.orientation import encloses_any
 from ..kinematics.transforms import Array
 from ..model.environment import Boundary
 from ..pairs import Pair
@@ -70,11 +70,7 @@ class Containment:
         world = np.einsum("nij,cj->nci", inner[:, :3, :3], probe.points) + inner[:, None, :3, 3]
         local = np.einsum("nji,ncj->nci", outer[:, :3, :3], world - outer[:, None, :3, 3])
         analysis = self._parts[probe.outer].analysis
-        near = np.all((local > analysis.vertices.min(axis=0)) & (local < analysis.vertices.max(axis=0)), axis=-1)
-        inside = np.zeros(near.shape, dtype=bool)
-        if near.any():
-            inside[near] = np.abs(winding_numbers(local[near], analysis.vertices, analysis.faces)) > 0.5
-        return np.asarray(inside.any(axis=-1))
+        return encloses_any(analysis.vertices, analysis.faces, local)
 
 
 def _component_points(part: Part) -> Array:

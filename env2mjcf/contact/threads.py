@@ -12,7 +12,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ..system.locks import working
+from ..system.locks import delayed_exit
 from .executors import on_executor, worker_count
 from .queries import ContactQueries
 from .tasks import Chunks, Question, Store
@@ -88,7 +88,7 @@ def _in_threads(queries: ContactQueries, question: Question, store: Store, count
         try:
             while (rows := chunks.take()) is not None:
                 began = time.perf_counter()
-                with working():
+                with delayed_exit():
                     store(rows, question.answers(queries, rows))
                 chunks.took(rows.stop - rows.start, time.perf_counter() - began)
         finally:

@@ -14,9 +14,6 @@ from ..contact.types import Contact, Reason, Verdict, deepest
 from ..kinematics.transforms import Array
 from .scene import Scene
 
-SEED = 0
-"""Of the configurations that `count_touching` draws."""
-
 
 class Verdicts:
     """Verdicts on configurations.
@@ -113,7 +110,7 @@ def count_touching(scene: Scene, samples: int) -> tuple[PairCount, ...]:
         raise ValueError(f"samples is {samples}; expected at least 1")
     counts = dict.fromkeys(scene.pairs, 0)
     if counts:
-        for q in np.vstack([scene.space.home, scene.space.sample(samples - 1, SEED)]):
+        for q in np.vstack([scene.space.home, scene.space.sample(samples - 1, seed=0)]):
             for pair in {(c.link, c.other) for c in scene.contacts(q)}:
                 counts[pair] += 1
     constant = {(p.link, p.other) for p in scene.compiled.pairs.tested if p.constant}
