@@ -19,7 +19,7 @@ from ..limits import Limits
 from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write, written_index
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832
@@ -91,7 +91,7 @@ def path_record(scene: Scene, source: Source, log: DiagnosticLog) -> PathRecord:
         return _of_poses(scene, source, found, found.poses, log)
     rows: list[tuple[int, Sequence[float]]] = [(row.robot, row.configuration) for row in found.rows]
     if found.version in text.OF_TURNS:
-        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
+        rows = from_turns(scene, rows, source.path, source.line_span(1), log)
     q = configurations(scene, rows)
     robots = np.array([row.robot for row in found.rows], dtype=np.int64)
     none = np.zeros(len(q))

@@ -84,7 +84,7 @@ def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) ->
     return q
 
 
-def out_of_turns(
+def from_turns(
     scene: Scene, rows: Sequence[tuple[int, Sequence[float]]], file: str, span: Span, log: DiagnosticLog
 ) -> list[tuple[int, Sequence[float]]]:
     """Return rows of dialect A's time, whose angles are turns, in the units of the scene's dialect.

@@ -22,7 +22,7 @@ from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
 from ..options import PathArgument, whole
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write, written_index
 
 Indices = NDArray[np.int64]
 Rows = list[tuple[int, Sequence[float]]]
@@ -151,7 +151,7 @@ def roadmap_record(scene: Scene, source: Source, log: DiagnosticLog) -> Roadmap:
     edges = np.array([pair for pair, _ in kept], dtype=np.int64).reshape(-1, 2)
     between: Rows = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
     if found.header.of_turns:
-        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
+        rows = from_turns(scene, rows, source.path, source.line_span(1), log)
     stops = np.cumsum([0, *(len(edge.intermediates) for _, edge in kept)])
     q, corners = configurations(scene, rows), configurations(scene, between)
     info = np.array([(*n.info, *[np.nan] * (3 - len(n.info))) for n in nodes], dtype=np.float64).reshape(-1, 3)

@@ -39,7 +39,7 @@ class Parcel:
     """A scene's queries as bytes.
 
     Attributes:
-        digest: SHA-256 of the content: equal names mean equal bytes.
+        digest: SHA-256 of the content.
         content: Compressed pickle.
     """
 
@@ -57,7 +57,7 @@ class Task:
         question: The question, with the columns of these rows.
     """
 
-    scene: Any
+    scene: str | ContactQueries
     content: bytes | None
     question: Question
 
