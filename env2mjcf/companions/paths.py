@@ -16,10 +16,11 @@ from ..formats.source import Source, read_source
 from ..kinematics.forward import configuration_of_poses
 from ..kinematics.transforms import Array, pose_gaps, rotation_matrix, transform
 from ..limits import Limits
+from ..model.dialects import begins_with_robot
 from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, from_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832
@@ -116,7 +117,8 @@ def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -
     """
     rows = file_numbers(scene, q, robot)
     version = text.TURNS if scene.environment.dialect is Dialect.A else text.CURRENT
-    return write(file, text.path_text(rows, version, written_index(scene, robot)))
+    index = robot if begins_with_robot(scene.environment) else None
+    return write(file, text.path_text(rows, version, index))
 
 
 def _pose_counts(scene: Scene) -> list[int]:

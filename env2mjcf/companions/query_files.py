@@ -63,7 +63,7 @@ def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgume
     if not any(len(q.q) for q in listed):
         raise ValueError("queries hold no configuration; expected a start and a goal")
     tasks = [Task(q.robot, tuple(map(tuple, file_numbers(scene, q.q, q.robot)))) for q in listed]
-    return write(file, text.query_text(tasks, index=written_index(scene, 0) is not None))
+    return write(file, text.query_text(tasks, index=begins_with_robot(scene.environment)))
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -118,11 +118,6 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
     if (np.abs(numbers) > LARGEST).any():
         raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
     return numbers.tolist()
-
-
-def written_index(scene: Scene, robot: int) -> int | None:
-    """Return the index that a robot's configurations begin with; None where the dialect writes none."""
-    return robot if begins_with_robot(scene.environment) else None
 
 
 def write(file: PathArgument, text: str) -> Path:

@@ -20,9 +20,10 @@ from ..formats.lexer import parse_number
 from ..formats.source import Source, read_source
 from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
+from ..model.dialects import begins_with_robot
 from ..options import PathArgument, whole
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, from_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 Indices = NDArray[np.int64]
 Rows = list[tuple[int, Sequence[float]]]
@@ -189,8 +190,8 @@ def write_roadmap(scene: Scene, roadmap: Roadmap, file: PathArgument) -> Path:
     named = roadmap.header.environment or Path(scene.environment.path).name
     if not (np.abs(roadmap.weights) <= LARGEST).all():
         raise ValueError(f"weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
-    index = written_index(scene, 0) is not None
-    return write(file, text.roadmap_text(_nodes(scene, roadmap), named, index=index))
+    nodes = _nodes(scene, roadmap)
+    return write(file, text.roadmap_text(nodes, named, index=begins_with_robot(scene.environment)))
 
 
 def _pairs(edges: ArrayLike) -> Indices:

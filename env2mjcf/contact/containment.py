@@ -44,7 +44,9 @@ class Containment:
             for outer, inner in ((pair.link, pair.other), (pair.other, pair.link)):
                 shape = parts[outer].shape
                 if shape is not None and shape.needs_containment:
-                    self._probes.append(_Probe(i, outer, inner, _component_points(parts[inner])))
+                    mesh = parts[inner].analysis
+                    first = np.unique(mesh.component, return_index=True)[1]
+                    self._probes.append(_Probe(i, outer, inner, mesh.vertices[mesh.faces[first, 0]]))
 
     @property
     def needed(self) -> bool:
@@ -71,12 +73,6 @@ class Containment:
         local = np.einsum("nji,ncj->nci", outer[:, :3, :3], world - outer[:, None, :3, 3])
         analysis = self._parts[probe.outer].analysis
         return encloses_any(analysis.vertices, analysis.faces, local)
-
-
-def _component_points(part: Part) -> Array:
-    analysis = part.analysis
-    _, first = np.unique(analysis.component, return_index=True)
-    return analysis.vertices[analysis.faces[first, 0]]
 
 
 class BoundaryTest:

@@ -222,14 +222,12 @@ def _bisecting(steps: int) -> Array:
     return _remembered(steps) if steps <= _SHORT else _times(steps)
 
 
-@lru_cache(maxsize=_SHORT)
-def _remembered(steps: int) -> Array:
-    return _times(steps)
-
-
 def _times(steps: int) -> Array:
     strides = [1 << k for k in range((steps - 1).bit_length(), 0, -1)]
     indices = np.concatenate([[steps], *(np.arange(stride // 2, steps, stride) for stride in strides)])
     times = indices[:, None] / steps
     times.setflags(write=False)
     return times
+
+
+_remembered = lru_cache(maxsize=_SHORT)(_times)

@@ -604,10 +604,7 @@ class Scene:
         return answers if not one else answers[0] if shape else answers[0].item()
 
     def _at_once(self, q: ArrayLike) -> Array | None:
-        """Return a single good row as (1, dim); None for anything else, which takes the long way.
-
-        A verdict may take less than a microsecond, and so must this check.
-        """
+        """Return a single good row as (1, dim), within a microsecond; None for all else, which takes the long way."""
         # A finite sum has finite terms; finite terms whose sum overflows take the long way, too.
         if type(q) is np.ndarray and q.shape == self._one_row and q.dtype is _FLOAT and isfinite(sum(q.tolist())):
             return q[None]
