@@ -207,7 +207,7 @@ def refuse_foreign(
         out: The file to write.
         code: The code of the diagnostic.
         kind: What is written, as "a path file".
-        belongs: Says of the beginning of a file whether it is of that kind; nobody misses one of white space only.
+        belongs: Says of the beginning of a file whether it is of that kind; one of white space only is always replaced.
         size: Bytes that tell what it is; -1 for all.
         hint: What to do about it.
 

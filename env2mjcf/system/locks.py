@@ -70,7 +70,7 @@ def folder_lock(folder: Path) -> Generator[None]:
     """Keep other processes and threads from changing a folder, where the system can lock it.
 
     Raises:
-        FolderBusyError: Another one does not let anybody in.
+        FolderBusyError: Another one has kept it locked for too long.
         OSError: The folder cannot be opened.
     """
     if os.name == "nt":  # folders cannot be opened
