@@ -43,7 +43,7 @@ class BatchResult:
         output: The file with one answer for each row.
         what: What was asked.
         rows: Number of rows.
-        counts: How many rows there are of each kind.
+        counts: How many rows are "in collision" and "free", or "valid" and "invalid".
         least: The least clearance in metres; None where clearance was not asked for, or there are no rows.
         resumed: Rows that an earlier run had answered.
         seconds: How long this run took for the others.

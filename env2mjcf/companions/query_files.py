@@ -19,7 +19,7 @@ from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Dialect, Task
-from ..options import PathArgument
+from ..options import PathArgument, whole
 from ..simulation.scene import Query, Scene
 from ..system.files import output
 
@@ -108,11 +108,12 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
     because not every double is a multiple of pi.
 
     Raises:
+        TypeError: The robot is not a whole number.
         ValueError: q has a wrong shape, a value that is not finite or too large, or there is no such robot.
     """
     space = scene.space
     count = len(space.robot_slices)
-    if not 0 <= robot < count:
+    if not 0 <= whole("robot", robot, 0) < count:
         raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
     numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, space.robot_slices[robot]]
     if (np.abs(numbers) > LARGEST).any():

@@ -11,6 +11,7 @@ from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
 from ..kinematics.transforms import Array
 from ..kinematics.tree import POSITIONS, ROTATIONS, DofKind
+from ..options import positive
 from ..pairs import Pair
 
 # Without a resolution in the file, a step is this fraction of the extent.
@@ -37,14 +38,13 @@ class EdgeSteps:
         """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            ValueError: The resolution is not a positive number.
+            TypeError: The resolution is not a number.
+            ValueError: It is not positive, or not finite.
         """
         if resolution is None:
             of_file = self._assembly.environment.resolution.position
             return of_file if of_file else self.default_resolution
-        if not 0 < resolution < float("inf"):
-            raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
-        return resolution
+        return positive("resolution", resolution)
 
     def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
         """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""

@@ -135,7 +135,7 @@ def on_executor(
     """
     if not callable(getattr(executor, "submit", None)):
         expected = "a concurrent.futures.Executor, such as ProcessPoolExecutor() or dask's Client(...).get_executor()"
-        raise TypeError(f"executor is a {type(executor).__name__}; expected {expected}")
+        raise TypeError(f"executor is {executor!r}; expected {expected}")
     # Derived classes may be something else: interpreters share no objects.
     here = type(executor) is ThreadPoolExecutor
     scene = queries if here else parcel(queries).digest

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model.dialects import RULES
 from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
+from ..options import whole
 from .forward import RobotKinematics
 from .transforms import Array, angles_from_quaternion, quaternion_from_angles, real_array, wrap
 from .tree import POSITIONS, DofKind
@@ -193,7 +194,7 @@ class ConfigurationSpace:
         from twice that radius where there are no obstacles.
         """
         lower, upper = self.sample_limits
-        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+        return np.random.default_rng(seed).uniform(lower, upper, size=(whole("n", n, 0), self.dim))
 
     @property
     def sample_limits(self) -> tuple[Array, Array]:

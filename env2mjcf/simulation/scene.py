@@ -251,7 +251,7 @@ class Scene:
         Raises:
             ValueError: q has a wrong shape or a value that is not finite, the engine is unknown or not installed, or
                 threads is below 1.
-            TypeError: The executor is not an Executor, or threads is not an integer.
+            TypeError: The executor is not an Executor, or threads is not a whole number.
             concurrent.futures.BrokenExecutor: A worker process died, and the executor does not replace it.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
@@ -521,7 +521,8 @@ class Scene:
         """Return the step in metres that a resolution means: itself, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            ValueError: The resolution is not positive.
+            TypeError: The resolution is not a number.
+            ValueError: It is not positive, or not finite.
         """
         return self._solver.steps.resolution(resolution)
 
