@@ -113,6 +113,7 @@ def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -
 
     Raises:
         ConversionError: The file cannot be written.
+        TypeError: The robot is not a whole number.
         ValueError: q has a wrong shape or a value that is not finite, or there is no such robot.
     """
     rows = file_numbers(scene, q, robot)
