@@ -159,14 +159,12 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
     "engine": get_args(Engine),
 }
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
-    **dict.fromkeys(("density", "scale"), (Real, "a number")),
     **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
     **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
-    "adjacent_links": (Integral, "an integer"),
     "limits": (Limits, "Limits(...)"),
 }
-# What a problem XML may say, too: None leaves it to the file.
-_OF_THE_FILE = ("self_collision", "adjacent_links", "gravity")
+# None leaves to a problem XML what it may say, too.
+_OPTIONAL = ("query", "self_collision", "adjacent_links", "gravity")
 
 
 def _checked(name: str, given: object) -> object:
@@ -178,23 +176,23 @@ def _checked(name: str, given: object) -> object:
     """
     if name in _CHOICES:
         return _one_of(name, given, _CHOICES[name])
-    if name == "query" or (given is None and name in _OF_THE_FILE):
-        return given
+    if given is None and name in _OPTIONAL:
+        return None
+    if name == "query":
+        return _path(name, given)
+    if name == "adjacent_links":
+        return whole(name, given, 0)
+    if name in ("density", "scale"):
+        return positive(name, given)
     kind, expected = _KINDS.get(name, (bool, "True or False"))
     if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
         raise TypeError(f"{name}={given!r}; expected {expected}")
     value: Any = given
     if name in ("robots", "mesh_dirs"):
-        return (value,) if isinstance(value, (str, PathLike)) else tuple(value)
+        return (value,) if isinstance(value, (str, PathLike)) else tuple(_path(name, path) for path in value)
     if name == "exclude_pairs":
         return tuple(_pair(pair) for pair in value)
-    if name == "gravity":
-        return _gravity(value)
-    if name in ("density", "scale") and not 0 < value < math.inf:
-        raise ValueError(f"{name} must be a positive number, got {value!r}")
-    if name == "adjacent_links" and value < 0:
-        raise ValueError(f"{name} must not be negative, got {value!r}")
-    return value
+    return _gravity(value) if name == "gravity" else value
 
 
 def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object:
@@ -202,6 +200,12 @@ def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object
         guess = did_you_mean(str(value), [str(a) for a in allowed])
         choices = ", ".join(repr(a) for a in allowed)
         raise ValueError(f"{name}={value!r} is not one of {choices}{f'; {guess}' if guess else ''}")
+    return value
+
+
+def _path(name: str, value: object) -> object:
+    if not isinstance(value, (str, PathLike)):
+        raise TypeError(f"{name}: {value!r} is not a path; expected a str or pathlib.Path")
     return value
 
 
@@ -213,9 +217,16 @@ def _pair(value: Any) -> tuple[str, str]:
 
 def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
     values = tuple(value)
-    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(g) for g in values):
+    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(_double(g)) for g in values):
         raise ValueError(f"gravity must be three finite numbers, got {values!r}")
     return tuple(float(g) for g in values)
+
+
+def _double(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer too large for one
+        return math.inf
 
 
 def whole(name: str, value: object, least: int, most: int | None = None) -> int:
@@ -243,7 +254,7 @@ def positive(name: str, value: object, most: float | None = None) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} is {value!r}; expected a number")
-    number = float(value)
+    number = _double(value)
     if not 0 < number < math.inf or (most is not None and number > most):
         limit = "" if most is None else f" up to {most:g}"
         raise ValueError(f"{name} is {value}; expected a positive number{limit}")

@@ -11,6 +11,7 @@ from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
 from ..kinematics.transforms import Array
 from ..kinematics.tree import DofKind
+from ..options import positive
 from ..pairs import Pair
 
 _TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
@@ -40,14 +41,13 @@ class EdgeSteps:
         """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            ValueError: The resolution is not a positive number.
+            TypeError: The resolution is not a number.
+            ValueError: It is not positive.
         """
         if resolution is None:
             of_file = self._assembly.environment.resolution.position
             return of_file if of_file else self.usual
-        if not 0 < resolution < float("inf"):
-            raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
-        return resolution
+        return positive("resolution", resolution)
 
     def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
         """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""

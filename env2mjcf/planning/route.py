@@ -137,7 +137,7 @@ def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
 
 def _step(scene: Scene, resolution: float | None) -> float:
     """Return the planner's step in metres."""
-    step = scene.resolution(None if resolution is None else positive("resolution", resolution))
+    step = scene.resolution(resolution)
     least = _FINEST * scene.extent
     if step >= least:
         return step
