@@ -161,6 +161,7 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
     **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
+    "query": ((str, PathLike), "a path"),
     "limits": (Limits, "Limits(...)"),
 }
 # None leaves to a problem XML what it may say, too.
@@ -178,8 +179,6 @@ def _checked(name: str, given: object) -> object:
         return _one_of(name, given, _CHOICES[name])
     if given is None and name in _OPTIONAL:
         return None
-    if name == "query":
-        return _path(name, given)
     if name == "adjacent_links":
         return whole(name, given, 0)
     if name in ("density", "scale"):
@@ -189,7 +188,10 @@ def _checked(name: str, given: object) -> object:
         raise TypeError(f"{name}={given!r}; expected {expected}")
     value: Any = given
     if name in ("robots", "mesh_dirs"):
-        return (value,) if isinstance(value, (str, PathLike)) else tuple(_path(name, path) for path in value)
+        paths = (value,) if isinstance(value, (str, PathLike)) else tuple(value)
+        if wrong := [path for path in paths if not isinstance(path, (str, PathLike))]:
+            raise TypeError(f"{name} holds {wrong[0]!r}; expected paths")
+        return paths
     if name == "exclude_pairs":
         return tuple(_pair(pair) for pair in value)
     return _gravity(value) if name == "gravity" else value
@@ -203,12 +205,6 @@ def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object
     return value
 
 
-def _path(name: str, value: object) -> object:
-    if not isinstance(value, (str, PathLike)):
-        raise TypeError(f"{name}: {value!r} is not a path; expected a str or pathlib.Path")
-    return value
-
-
 def _pair(value: Any) -> tuple[str, str]:
     if isinstance(value, str) or not isinstance(value, Iterable) or len(pair := tuple[Any, ...](value)) != 2:
         raise ValueError(f"exclude_pairs holds {value!r}; expected pairs of names, as in [('link1', 'block')]")
@@ -217,16 +213,9 @@ def _pair(value: Any) -> tuple[str, str]:
 
 def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
     values = tuple(value)
-    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(_double(g)) for g in values):
+    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(g) for g in values):
         raise ValueError(f"gravity must be three finite numbers, got {values!r}")
     return tuple(float(g) for g in values)
-
-
-def _double(value: Real) -> float:
-    try:
-        return float(value)
-    except OverflowError:  # an integer too large for one
-        return math.inf
 
 
 def whole(name: str, value: object, least: int, most: int | None = None) -> int:
@@ -254,7 +243,7 @@ def positive(name: str, value: object, most: float | None = None) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} is {value!r}; expected a number")
-    number = _double(value)
+    number = float(value)
     if not 0 < number < math.inf or (most is not None and number > most):
         limit = "" if most is None else f" up to {most:g}"
         raise ValueError(f"{name} is {value}; expected a positive number{limit}")

@@ -41,12 +41,10 @@ class EdgeSteps:
         """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            TypeError: The resolution is not a number.
-            ValueError: It is not positive.
+            TypeError, ValueError: The resolution is not a positive number.
         """
         if resolution is None:
-            of_file = self._assembly.environment.resolution.position
-            return of_file if of_file else self.usual
+            return self._assembly.environment.resolution.position or self.usual
         return positive("resolution", resolution)
 
     def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:

@@ -27,8 +27,7 @@ def thread_count(threads: int | None, rows: int) -> int:
     """Return how many threads to use: as many as given, else 1 for few rows and all cores for many.
 
     Raises:
-        TypeError: The number of threads is not a whole number.
-        ValueError: It is below 1.
+        TypeError, ValueError: The number of threads is not a whole number, or below 1.
     """
     if threads is None:
         return 1 if rows < _ROWS_FOR_THREADS else os.cpu_count() or 1
@@ -54,8 +53,7 @@ def ask(
         progress: Whether to show a progress bar on a terminal.
 
     Raises:
-        ValueError: The number of threads is below 1.
-        TypeError: It is not a whole number, or the executor is not an Executor.
+        TypeError, ValueError: As for `thread_count`; or the executor is not an Executor.
     """
     rows = question.rows
     count = thread_count(threads, rows)

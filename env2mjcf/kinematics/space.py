@@ -111,7 +111,7 @@ class ConfigurationSpace:
         """
         values = real_array(q, "q", self.names)
         if values.ndim not in (1, 2) or values.shape[-1] != self.dim:
-            expected = f"({self.dim},) or (n, {self.dim}){self._listed()}"
+            expected = f"({self.dim},) or (n, {self.dim}): {self.first_names()}"
             raise ValueError(f"configurations of shape {values.shape}; expected {expected}")
         return values
 
@@ -256,11 +256,11 @@ class ConfigurationSpace:
             self.upper[self._axis == axis] = high[axis]
 
     def __repr__(self) -> str:
-        return f"<ConfigurationSpace of {self.dim} degrees of freedom{self._listed()}>"
+        return f"<ConfigurationSpace of {self.dim} degrees of freedom: {self.first_names()}>"
 
-    def _listed(self) -> str:
-        more = ", ..." if self.dim > _LISTED else ""
-        return f": {', '.join(self.names[:_LISTED])}{more}" if self.dim else ""
+    def first_names(self) -> str:
+        """Return the names of the first degrees of freedom, for a message."""
+        return ", ".join(self.names[:_LISTED]) + (", ..." if self.dim > _LISTED else "") or "none"
 
     def _last_axis(self, values: ArrayLike, what: str) -> Array:
         array = real_array(values, what, self.names)

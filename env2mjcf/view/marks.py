@@ -109,8 +109,6 @@ def _check(points: ArrayLike, color: Color, name: str, size: float) -> None:
 def _triples(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return positions or directions, (k, 3)."""
     found = real_array(values, f"array of {name}")
-    if not found.size:
-        return np.zeros((0, 3))
-    if found.ndim != 2 or found.shape[1] != 3:
+    if found.size and (found.ndim != 2 or found.shape[1] != 3):
         raise ValueError(f"{name} of shape {found.shape}; expected (k, 3)")
-    return found
+    return found.reshape(-1, 3)
