@@ -159,14 +159,13 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
     "engine": get_args(Engine),
 }
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
-    **dict.fromkeys(("density", "scale"), (Real, "a number")),
     **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
     **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
-    "adjacent_links": (Integral, "an integer"),
+    "query": ((str, PathLike), "a path"),
     "limits": (Limits, "Limits(...)"),
 }
-# What a problem XML may say, too: None leaves it to the file.
-_OF_THE_FILE = ("self_collision", "adjacent_links", "gravity")
+# None leaves to a problem XML what it may say, too.
+_OPTIONAL = ("query", "self_collision", "adjacent_links", "gravity")
 
 
 def _checked(name: str, given: object) -> object:
@@ -178,23 +177,24 @@ def _checked(name: str, given: object) -> object:
     """
     if name in _CHOICES:
         return _one_of(name, given, _CHOICES[name])
-    if name == "query" or (given is None and name in _OF_THE_FILE):
-        return given
+    if given is None and name in _OPTIONAL:
+        return None
+    if name == "adjacent_links":
+        return whole(name, given, 0)
+    if name in ("density", "scale"):
+        return positive(name, given)
     kind, expected = _KINDS.get(name, (bool, "True or False"))
     if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
         raise TypeError(f"{name}={given!r}; expected {expected}")
     value: Any = given
     if name in ("robots", "mesh_dirs"):
-        return (value,) if isinstance(value, (str, PathLike)) else tuple(value)
+        paths = (value,) if isinstance(value, (str, PathLike)) else tuple(value)
+        if wrong := [path for path in paths if not isinstance(path, (str, PathLike))]:
+            raise TypeError(f"{name} holds {wrong[0]!r}; expected paths")
+        return paths
     if name == "exclude_pairs":
         return tuple(_pair(pair) for pair in value)
-    if name == "gravity":
-        return _gravity(value)
-    if name in ("density", "scale") and not 0 < value < math.inf:
-        raise ValueError(f"{name} must be a positive number, got {value!r}")
-    if name == "adjacent_links" and value < 0:
-        raise ValueError(f"{name} must not be negative, got {value!r}")
-    return value
+    return _gravity(value) if name == "gravity" else value
 
 
 def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object:

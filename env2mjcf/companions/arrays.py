@@ -121,7 +121,7 @@ def coordinates(
         FormatError: A number is not finite, or too large.
     """
     with np.errstate(over="ignore"):
-        values = rows.astype(np.float64)
+        values = np.array(rows, dtype=np.float64)
     good = np.abs(values) <= LARGEST
     if not good.all():
         row, column = (int(i) for i in np.argwhere(~good)[0])

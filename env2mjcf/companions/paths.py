@@ -64,6 +64,9 @@ class PathRecord:
     def __len__(self) -> int:
         return len(self.q)
 
+    def __repr__(self) -> str:
+        return f"<PathRecord {self.file!r}: {len(self)} configurations>"
+
 
 def read_path(scene: Scene, file: PathArgument, *, limits: Limits | None = None, strict: bool = False) -> PathRecord:
     """Read a path file of any version for a scene.

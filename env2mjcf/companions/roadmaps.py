@@ -18,7 +18,7 @@ from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
 from ..formats.lexer import parse_number
 from ..formats.source import Source, read_source
-from ..kinematics.transforms import Array
+from ..kinematics.transforms import Array, real_array
 from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..options import PathArgument, whole
@@ -90,7 +90,7 @@ class Roadmap:
             ValueError: Shapes do not belong together, a number is not finite, an index is not a whole number, or an
                 edge leads to no node, to its own, or stands there twice.
         """
-        nodes = np.asarray(q, dtype=np.float64)
+        nodes = real_array(q, "array of nodes")
         pairs = _pairs(edges)
         n, m = len(nodes), len(pairs)
         if nodes.ndim != 2:
@@ -102,21 +102,24 @@ class Roadmap:
         if len(np.unique(np.sort(pairs, axis=1), axis=0)) != m:
             raise ValueError("an edge stands there twice; edges have no direction")
         lengths = np.linalg.norm(nodes[pairs[:, 1]] - nodes[pairs[:, 0]], axis=1)
-        given = lengths if weights is None else np.asarray(weights, dtype=np.float64)
+        given = lengths if weights is None else real_array(weights, "array of weights")
         between = [np.zeros((0, nodes.shape[1]))] * m if intermediates is None else list(intermediates)
         if given.shape != (m,) or len(between) != m:
             raise ValueError(
                 f"{given.shape} weights and {len(between)} intermediates; expected one for each of {m} edges"
             )
         if not (np.abs(nodes) <= LARGEST).all() or not (np.abs(given) <= LARGEST).all():
-            raise ValueError(f"nodes or weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
-        ways = tuple(np.asarray(b, dtype=np.float64).reshape(-1, nodes.shape[1]) for b in between)
+            raise ValueError(f"nodes or weights beyond {LARGEST:g}; no file can hold them")
+        ways = tuple(real_array(b, "array of intermediates").reshape(-1, nodes.shape[1]) for b in between)
         robots = np.full(n, whole("robot", robot, 0), dtype=np.int64)
         info, planners, lines = np.full((n, 3), np.nan), np.full(m, -1, dtype=np.int64), np.zeros(n, dtype=np.int64)
         return cls(nodes, pairs, given, ways, np.arange(n), robots, info, planners, lines)
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def __repr__(self) -> str:
+        return f"<Roadmap {self.file!r}: {len(self)} nodes, {len(self.edges)} edges>"
 
     def way(self, edge: int) -> Array:
         """Return the corners of an edge, both ends included, (k, dim)."""
@@ -196,6 +199,8 @@ def write_roadmap(scene: Scene, roadmap: Roadmap, file: PathArgument) -> Path:
 
 def _pairs(edges: ArrayLike) -> Indices:
     """Return edges as indices, (m, 2)."""
+    if isinstance(edges, np.ma.MaskedArray):
+        raise ValueError("edges are a masked array; expected plain whole numbers")
     given = np.asarray(edges)
     if not given.size:
         return np.zeros((0, 2), dtype=np.int64)

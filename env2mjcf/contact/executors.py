@@ -133,7 +133,7 @@ def on_executor(
         TypeError: The executor has no `submit`.
         BrokenExecutor: A worker process died, and the executor does not replace it. (Dask's does.)
     """
-    if not callable(getattr(executor, "submit", None)):
+    if isinstance(executor, type) or not callable(getattr(executor, "submit", None)):
         expected = "a concurrent.futures.Executor, such as ProcessPoolExecutor() or dask's Client(...).get_executor()"
         raise TypeError(f"executor is {executor!r}; expected {expected}")
     # Derived classes may be something else: interpreters share no objects.

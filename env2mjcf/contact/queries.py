@@ -263,7 +263,7 @@ class ContactQueries:
 
     def explain(self, row: Array, engine: Engine | None = None) -> Verdict:
         """Return all that is wrong with one configuration, (dim,)."""
-        return Verdict(row, (*deepest(self.contacts(row, engine)), *self.out_of_bounds(row)))
+        return Verdict(row.copy(), (*deepest(self.contacts(row, engine)), *self.out_of_bounds(row)))
 
     def contacts_of_poses(self, poses: Array) -> list[Contact]:
         """Return the contacts of links that stand anywhere, (nlinks, 4, 4), found on triangles."""

@@ -159,6 +159,9 @@ class PackedContacts:
     def __len__(self) -> int:
         return len(self.pair)
 
+    def __repr__(self) -> str:
+        return f"<PackedContacts: {len(self)} in {len(self.offsets) - 1} configurations>"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathReport:

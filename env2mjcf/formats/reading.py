@@ -52,7 +52,7 @@ def read(path: PathArgument, **options: Unpack[OptionKeywords]) -> Environment:
     Raises:
         FormatError: A file is missing, is not text, or breaks its grammar.
         KinematicsError: The bodies of a robot do not hang together.
-        TypeError: An unknown option.
+        TypeError, ValueError: An option cannot be used.
     """
     chosen = Options.from_keywords(options)
     log = DiagnosticLog(chosen.strict)

@@ -116,7 +116,7 @@ class ConfigurationSpace:
         """
         values = real_array(q, "q", self.names)
         if values.ndim not in (1, 2) or values.shape[-1] != self.dim:
-            expected = f"({self.dim},) or (n, {self.dim}){self._listed()}"
+            expected = f"({self.dim},) or (n, {self.dim}): {listed(self.names)}"
             raise ValueError(f"configurations of shape {values.shape}; expected {expected}")
         return values
 
@@ -261,10 +261,7 @@ class ConfigurationSpace:
             self.upper[self._axis == axis] = high[axis]
 
     def __repr__(self) -> str:
-        return f"<ConfigurationSpace of {self.dim} degrees of freedom{self._listed()}>"
-
-    def _listed(self) -> str:
-        return f": {listed(self.names)}" if self.dim else ""
+        return f"<ConfigurationSpace of {self.dim} degrees of freedom{': ' * bool(self.dim)}{listed(self.names)}>"
 
     def _last_axis(self, values: ArrayLike, what: str) -> Array:
         array = real_array(values, what, self.names)

@@ -27,8 +27,7 @@ def load(path: PathArgument, **options: Unpack[OptionKeywords]) -> Scene:
         GeometryError: A mesh is missing or unusable.
         KinematicsError: The bodies of a robot do not hang together.
         ConversionError: MuJoCo cannot express, or refuses, the scene.
-        TypeError: An unknown option.
-        ValueError: A value that an option cannot take.
+        TypeError, ValueError: An option cannot be used.
     """
     chosen = Options.from_keywords(options)
     return prepare(path, chosen, DiagnosticLog(chosen.strict))

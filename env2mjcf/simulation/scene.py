@@ -497,7 +497,7 @@ class Scene:
             return PathReport(True, good, failed < 0, None, None, ())
         i = int(bad[0])
         edge = slice(i, i + 1)
-        q = even_rows(start[edge], delta[edge], counts[edge], failed[edge])[0] if good[i] else rows[i]
+        q = even_rows(start[edge], delta[edge], counts[edge], failed[edge])[0] if good[i] else rows[i].copy()
         return PathReport(False, good, failed < 0, i, q, tuple(self._solver.contacts(q, engine)))
 
     def first_invalid_steps(
@@ -566,7 +566,7 @@ class Scene:
     def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
         state = self.__getstate__()
         twin = Scene.__new__(Scene)
-        twin.__setstate__({**state, "simulation": copy.deepcopy(state["simulation"])})
+        twin.__setstate__({**state, "simulation": copy.deepcopy(state["simulation"], memo)})
         return twin
 
     def __repr__(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -23,7 +24,8 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
     """
     module = sys.modules[package]
     loader = cast("Any", module.__spec__).loader
-    stub = loader.get_data(f"{module.__file__}i").decode("utf-8")
+    # Beside the code, which may be compiled: `__init__.pyc`.
+    stub = loader.get_data(os.path.join(module.__path__[0], "__init__.pyi")).decode("utf-8")
     lines = (line.split() for line in stub.splitlines() if line.startswith("from ."))
     homes = {name: home for _, home, _, name, *_ in lines}
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..kinematics.transforms import real_array
 from ..options import positive
 
 Color = tuple[float, float, float, float]
@@ -107,10 +108,7 @@ def _check(points: ArrayLike, color: Color, name: str, size: float) -> None:
 
 def _triples(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return positions or directions, (k, 3)."""
-    found = np.asarray(values, dtype=np.float64)
-    if not found.size:
-        return np.zeros((0, 3))
-    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
-        what = f"of shape {found.shape}" if np.isfinite(found).all() else "that are not finite"
-        raise ValueError(f"{name} {what}; expected finite numbers of shape (k, 3)")
-    return found
+    found = real_array(values, f"array of {name}")
+    if found.size and (found.ndim != 2 or found.shape[1] != 3):
+        raise ValueError(f"{name} of shape {found.shape}; expected (k, 3)")
+    return found.reshape(-1, 3)

@@ -221,6 +221,8 @@ def test_a_roadmap_of_wrong_shapes_is_refused() -> None:
         Roadmap.of(np.zeros((2, 3)), [[0, 1]], weights=[1, 2])
     with pytest.raises(ValueError, match=r"expected \(n, dim\)"):
         Roadmap.of(np.zeros(3), [])
+    with pytest.raises(ValueError, match="nodes is a masked array"):
+        Roadmap.of(np.ma.masked_array(np.zeros((2, 3)), mask=True), [])
 
 
 @pytest.mark.parametrize(
@@ -230,13 +232,16 @@ def test_a_roadmap_of_wrong_shapes_is_refused() -> None:
         ([[0, 0]], {}, "from a node to itself"),
         ([[0, 1], [1, 0]], {}, "twice"),
         ([0, 1], {}, r"expected \(m, 2\)"),
-        ([[0, 1]], {"weights": [math.nan]}, "not finite"),
+        ([[0, 1]], {"weights": [math.nan]}, "weights holds nan"),
         ([[0, 1]], {"robot": -1}, "robot is -1"),
+        ([[0, 1]], {"weights": ["1"]}, "expected real numbers"),
+        ([[0, 1]], {"weights": np.array([1j])}, "expected real numbers"),
+        ([[0, 1]], {"intermediates": [[[math.inf] * 3]]}, "intermediates holds inf"),
+        ([[0, 1]], {"intermediates": [[["1"] * 3]]}, "expected real numbers"),
+        (np.ma.masked_array([[0, 1]], mask=True), {}, "masked"),
     ],
 )
-def test_a_roadmap_that_no_reader_would_give_back_is_refused(
-    edges: list[Any], more: dict[str, Any], message: str
-) -> None:
+def test_a_roadmap_that_no_reader_would_give_back_is_refused(edges: Any, more: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Roadmap.of(np.zeros((2, 3)), edges, **more)
 

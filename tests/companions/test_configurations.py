@@ -58,6 +58,7 @@ def test_files_of_every_kind(
 def test_numpy_files(scene: Scene, tmp_path: Path, file_units: bool, expected: list[float]) -> None:
     np.save(tmp_path / "a.npy", np.array([ALL, ALL], dtype=np.float32))
     q = env2mjcf.read_configurations(str(tmp_path / "a.npy"), scene, file_units=file_units)
+    assert type(q) is np.ndarray  # in memory: the file may be written anew
     assert q.dtype == np.float64
     np.testing.assert_allclose(q, [expected, expected], atol=1e-15)
     np.save(tmp_path / "a.npy", np.array([1, 3, 4, 0]))

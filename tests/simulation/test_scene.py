@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import mujoco
@@ -165,6 +167,25 @@ def test_a_call_is_checked_as_the_options_are(cubes: env2mjcf.Scene) -> None:
         cubes.in_collision(at(0, 0, 0), engine="foo")
     with pytest.raises(ValueError, match="expected real numbers"):
         cubes.in_collision(["a"] * 6)
+    with pytest.raises(TypeError, match="expected a whole number"):
+        cubes.in_collision(at(0, 0, 0), threads=1.5)  # type: ignore[arg-type]
+    for bad in ("a", [0.1], True):
+        with pytest.raises(TypeError, match="expected a number"):
+            cubes.resolution(bad)  # type: ignore[arg-type]
+
+
+def test_what_a_query_returns_stays_as_it_is(cubes: env2mjcf.Scene) -> None:
+    row, path = at(4.5, 0, 0), np.stack([at(4.5, 0, 0), at(0, 0, 0)])
+    verdict, report = cubes.explain(row), cubes.check_path(path)
+    row[:], path[:] = 7, 7
+    assert report.invalid_q is not None
+    np.testing.assert_array_equal([verdict.q, report.invalid_q], [at(4.5, 0, 0)] * 2)
+    assert repr(cubes.packed_contacts(np.tile(at(0, 0, 0), (9, 1)))) == "<PackedContacts: 0 in 9 configurations>"
+
+
+def test_a_deep_copy_keeps_together_what_belongs_together(cubes: env2mjcf.Scene) -> None:
+    scene, data = copy.deepcopy([cubes, cubes.data])
+    assert scene.data is data is not cubes.data
 
 
 @pytest.mark.parametrize("bad", [[np.nan] * 6, [np.inf, 0, 0, 0, 0, 0], [np.inf, -np.inf, 0, 0, 0, 0], [0.0] * 5])
@@ -258,6 +279,8 @@ def test_an_executor_must_be_one(cubes: env2mjcf.Scene) -> None:
     for query in (cubes.in_collision, cubes.is_valid, cubes.clearance):
         with pytest.raises(TypeError, match="ProcessPoolExecutor"):
             query(at(0, 0, 0), executor=object())
+        with pytest.raises(TypeError, match="ProcessPoolExecutor"):
+            query(at(0, 0, 0), executor=ThreadPoolExecutor)  # type: ignore[arg-type]
 
 
 def test_a_scene_without_a_robot_is_valid_and_says_so(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import compileall
+import shutil
 import subprocess
 import sys
 from importlib import import_module
@@ -121,6 +123,16 @@ def test_many_threads_may_use_a_name_for_the_first_time(tmp_path: Path) -> None:
         "with ThreadPoolExecutor(8) as pool: print(len(set(pool.map(first, range(64)))))"
     )
     assert said(code, tmp_path) == "4"
+
+
+def test_compiled_code_alone_has_the_names_too(tmp_path: Path) -> None:
+    package = tmp_path / "env2mjcf"
+    shutil.copytree(Path(env2mjcf.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    assert compileall.compile_dir(package, quiet=1, legacy=True)
+    for source in package.rglob("*.py"):
+        source.unlink()
+    code = "import env2mjcf, env2mjcf.view; env2mjcf.Options(); print(env2mjcf.__file__, *env2mjcf.view.__all__[:1])"
+    assert said(f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}", tmp_path).endswith(".pyc Direction")
 
 
 def test_submodules_are_there_and_the_version_is_known() -> None:

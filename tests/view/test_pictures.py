@@ -196,8 +196,10 @@ def test_a_size_is_two_whole_numbers(cubes: env2mjcf.Scene, size: object) -> Non
 @pytest.mark.parametrize(
     ("mark", "message"),
     [
-        (lambda: Points([[0, 0, math.nan]]), "^points that are not finite"),
-        (lambda: Points(np.zeros((3, 2))), r"^points of shape \(3, 2\); expected finite numbers of shape \(k, 3\)"),
+        (lambda: Points([[0, 0, math.nan]]), "^array of points holds nan"),
+        (lambda: Points([["1", "2", "3"]]), "expected real numbers"),
+        (lambda: Polyline(np.ma.masked_array(np.zeros((2, 3)), mask=True)), "is a masked array"),
+        (lambda: Points(np.zeros((3, 2))), r"^points of shape \(3, 2\); expected \(k, 3\)"),
         (lambda: Polyline(np.zeros(6)), r"^points of shape \(6,\)"),
         (lambda: Points(np.zeros((1, 3)), size=math.nan), "^size is nan"),
         (lambda: Points(np.zeros((1, 3)), color=(2, 0, 0, 1)), r"^color is \(2, 0, 0, 1\)"),
