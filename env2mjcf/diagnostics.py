@@ -1,4 +1,4 @@
-"""The catalogue of diagnostic codes: what each one means.
+"""The catalogue of diagnostic codes, what each one means; and the log that findings go to.
 
 Codes are stable. `ENV` concerns text files, `GEO` meshes, `KIN` bodies and connections, `MJC` what is written for
 MuJoCo, `CFG` configurations and queries.
@@ -243,7 +243,7 @@ CATALOGUE: dict[str, str] = {
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
     "CFG536": "The file's PositionRes is too small to plan with, or for checks of edges to end.",
-    "CFG537": "An edge is so long that it would take more checks than end.",
+    "CFG537": "An edge is so long that checking it would never end.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",

@@ -37,7 +37,7 @@ class Options:
         dialect: Read the file as this dialect instead of telling it from the text.
         strict: Turn warnings into errors.
         mesh_dirs: More folders in which meshes are looked for.
-        allow_outside: May meshes outside the scene's folder and `mesh_dirs` be read.
+        allow_outside: Read files outside the scene's folder and `mesh_dirs`, too, that a scene or problem XML names.
         collision: How meshes become convex collision shapes.
         primitives: Write exact boxes as box geoms.
         self_collision: Test links of one robot against each other; unless given, what a problem XML says, else True.

@@ -114,7 +114,7 @@ def loaded(path: str, options: Options) -> tuple[Scene, DiagnosticLog]:
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
-    """Print diagnostics to stderr; those that are only worth knowing on request."""
+    """Print diagnostics to stderr; notes only on request."""
     sys.stdout.flush()  # so that results stand before what is said about them
     console = console_on(sys.stderr, soft_wrap=True)
     for diagnostic in diagnostics:

@@ -22,8 +22,6 @@ from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
 
-__all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
-
 # Triangles above which reading a file is quicker than computing its content.
 _WORTH_KEEPING = 200
 
