@@ -159,7 +159,7 @@ def _count(source: Source, words: list[re.Match[str]], what: str, log: Diagnosti
 def _holds_poses(head: _Head, lines: Sequence[Line], dofs: Sequence[int], links: Sequence[int]) -> bool:
     if not lines or any(len(line.numbers) != _POSE for line in lines):
         return False
-    if head.links > 1 and head.version <= _LEGACY:
+    if head.links > 1 and head.version in (_LINK_POSES, _LEGACY):
         return True
     # A rigid body's pose is its configuration.
     return all(parse_row(line.numbers, dofs) is None for line in lines) and any(
