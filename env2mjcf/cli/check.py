@@ -17,12 +17,12 @@ from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, one_line
+from ..errors import ConversionError, counted, one_line
 from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE, FINDING
-from .terminal import counted, loaded, plain, print_diagnostics, print_json, print_parts, working
+from .terminal import loaded, plain, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from ..companions.records import Configurations, Graph, Poses

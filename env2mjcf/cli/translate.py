@@ -11,11 +11,12 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
+from ..errors import counted
 from ..limits import LARGEST, Limits
 from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
 from .program import DONE
-from .terminal import counted, one_line, print_diagnostics, print_json, print_parts
+from .terminal import one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..model.environment import Boundary, Environment

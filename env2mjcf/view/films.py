@@ -42,7 +42,7 @@ class Film:
     """A film that was written.
 
     Attributes:
-        file: Where.
+        file: The .mp4 or .gif file.
         q: (n, dim) the configuration of each picture.
         fps: Pictures per second.
         touching: The contacts of each picture's configuration; empty where it is free.

@@ -37,7 +37,7 @@ def split_thin(group: Group, wanted: Floats, around: Surroundings, cap: float) -
         cap: Greatest height of a cell.
 
     Returns:
-        Row and fitted parts, groups of one, of each polygon of which most is at least twice as thick thereby.
+        Row and fitted parts, groups of one, of each polygon most of which becomes at least twice as thick.
     """
     out: list[tuple[int, list[Group]]] = []
     for row in np.flatnonzero(_worth_cutting(group, cap)).tolist():
