@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
@@ -159,10 +160,8 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
     "engine": get_args(Engine),
 }
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
-    **dict.fromkeys(("density", "scale"), (Real, "a number")),
     **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
     **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
-    "adjacent_links": (Integral, "an integer"),
     "limits": (Limits, "Limits(...)"),
 }
 # What a problem XML may say, too: None leaves it to the file.
@@ -180,6 +179,10 @@ def _checked(name: str, given: object) -> object:
         return _one_of(name, given, _CHOICES[name])
     if name == "query" or (given is None and name in _OF_THE_FILE):
         return given
+    if name in ("density", "scale"):
+        return positive(name, given)
+    if name == "adjacent_links":
+        return whole(name, given, 0)
     kind, expected = _KINDS.get(name, (bool, "True or False"))
     if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
         raise TypeError(f"{name}={given!r}; expected {expected}")
@@ -188,13 +191,7 @@ def _checked(name: str, given: object) -> object:
         return (value,) if isinstance(value, (str, PathLike)) else tuple(value)
     if name == "exclude_pairs":
         return tuple(_pair(pair) for pair in value)
-    if name == "gravity":
-        return _gravity(value)
-    if name in ("density", "scale") and not 0 < value < math.inf:
-        raise ValueError(f"{name} must be a positive number, got {value!r}")
-    if name == "adjacent_links" and value < 0:
-        raise ValueError(f"{name} must not be negative, got {value!r}")
-    return value
+    return _gravity(value) if name == "gravity" else value
 
 
 def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object:
@@ -234,17 +231,16 @@ def whole(name: str, value: object, least: int, most: int | None = None) -> int:
     return number
 
 
-def positive(name: str, value: object, most: float | None = None) -> float:
+def positive(name: str, value: object) -> float:
     """Return an argument that is a finite number above zero.
 
     Raises:
         TypeError: It is not a number; the message names it.
-        ValueError: It is not positive, not finite, or above `most`.
+        ValueError: It is not positive, or not finite.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} is {value!r}; expected a number")
-    number = float(value)
-    if not 0 < number < math.inf or (most is not None and number > most):
-        limit = "" if most is None else f" up to {most:g}"
-        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
-    return number
+    # An integer may be larger than any float.
+    if not 0 < value <= sys.float_info.max:
+        raise ValueError(f"{name} is {value}; expected a positive number")
+    return float(value)

@@ -20,15 +20,15 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"collision": ["auto"]}, ValueError, "is not one of"),
     ({"dialect": "F"}, ValueError, "is not one of None, 'A'"),
     ({"engine": None}, ValueError, "is not one of 'auto'"),
-    ({"scale": -1}, ValueError, "scale must be a positive number, got -1"),
-    ({"scale": float("nan")}, ValueError, "scale must be a positive number, got nan"),
-    ({"density": True}, TypeError, "density=True; expected a number"),
+    ({"scale": -1}, ValueError, "scale is -1; expected a positive number"),
+    ({"scale": float("nan")}, ValueError, "scale is nan; expected a positive number"),
+    ({"density": True}, TypeError, "density is True; expected a number"),
     ({"gravity": 3}, TypeError, "gravity=3; expected a sequence"),
     ({"gravity": (0, 0)}, ValueError, "gravity must be three finite numbers"),
     ({"gravity": "123"}, ValueError, "gravity must be three finite numbers"),
     ({"gravity": (0, 0, float("inf"))}, ValueError, "gravity must be three finite numbers"),
-    ({"adjacent_links": -1}, ValueError, "adjacent_links must not be negative, got -1"),
-    ({"adjacent_links": 1.0}, TypeError, "adjacent_links=1.0; expected an integer"),
+    ({"adjacent_links": -1}, ValueError, "adjacent_links is -1; expected at least 0"),
+    ({"adjacent_links": 1.0}, TypeError, "adjacent_links is 1.0; expected a whole number"),
     ({"self_collision": 1}, TypeError, "self_collision=1; expected True or False"),
     ({"strict": None}, TypeError, "strict=None; expected True or False"),
     ({"exclude_pairs": ["ab"]}, ValueError, "exclude_pairs holds 'ab'"),
@@ -156,4 +156,4 @@ def test_without_a_problem_file_the_defaults_hold(tmp_path: Path) -> None:
 
 def test_a_wrong_value_on_the_command_line_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "nothing.env", "--scale", "-1"]) == 2
-    assert capsys.readouterr().err == "env2mjcf: info: scale must be a positive number, got -1.0\n"
+    assert capsys.readouterr().err == "env2mjcf: info: scale is -1.0; expected a positive number\n"
