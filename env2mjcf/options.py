@@ -240,7 +240,7 @@ def positive(name: str, value: object) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} is {value!r}; expected a number")
-    # An integer may be larger than any float.
-    if not 0 < value <= sys.float_info.max:
+    number: Any = value  # not a float yet: an integer may be larger than any
+    if not 0 < number <= sys.float_info.max:
         raise ValueError(f"{name} is {value}; expected a positive number")
-    return float(value)
+    return float(number)
