@@ -22,7 +22,7 @@ CORPUS: Path | None = Path(_FOLDER) if _FOLDER else None
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep the geometry cache of whoever runs the tests out of them; processes that tests start inherit this."""
+    """Keep the user's geometry cache out of the tests; processes that they start inherit this."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ENV2MJCF_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -34,7 +34,7 @@ def corpus() -> Path:
     if CORPUS is None:
         pytest.skip("ENV2MJCF_CORPUS does not name the folder of real scenes")
     if not CORPUS.is_dir():
-        pytest.fail(f"ENV2MJCF_CORPUS names {CORPUS}, which is no folder")
+        pytest.fail(f"ENV2MJCF_CORPUS names {CORPUS}, which is not a folder")
     return CORPUS
 
 

@@ -1,4 +1,4 @@
-"""Which pairs are tested: the rules of the contract, and that MuJoCo tests exactly those."""
+"""Which pairs are tested: the planner's rules, and that MuJoCo tests exactly those."""
 
 from __future__ import annotations
 

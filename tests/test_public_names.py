@@ -374,15 +374,15 @@ def plugin(folder: Path) -> dict[str, list[str]]:
         asked = [[*words, "--fixtures", "-q"], [*words, "--help"]]
         fixtures, helped = pool.map(lambda w: run(w, stdout=subprocess.PIPE, cwd=folder).stdout, asked)
     return {
-        "fixtures": re.findall(r"^(\w+).* -- .*(?:_env2mjcf_pytest|pytest_plugin)\.py", fixtures, re.MULTILINE),
+        "fixtures": re.findall(r"^(\w+).* -- .*pytest_plugin\.py", fixtures, re.MULTILINE),
         "options": sorted(set(re.findall(r"--env2mjcf-[a-z-]+", helped))),
     }
 
 
 def variables() -> list[str]:
     """Return the environment variables that the sources name."""
-    files = [*PACKAGE.rglob("*.py"), *PACKAGE.parent.glob("_env2mjcf_pytest.py")]
-    return sorted({v for f in files for v in re.findall(r"ENV2MJCF_[A-Z_]+", f.read_text(encoding="utf-8"))})
+    text = "".join(f.read_text(encoding="utf-8") for f in PACKAGE.rglob("*.py"))
+    return sorted(set(re.findall(r"ENV2MJCF_[A-Z_]+", text)))
 
 
 def entry_points() -> dict[str, dict[str, str]]:
@@ -428,7 +428,7 @@ def catalogue() -> dict[str, str]:
 
 
 def differences(old: Any, new: Any, path: str) -> Iterator[str]:
-    """Yield what is recorded and is no more, or is another."""
+    """Yield what is recorded and is gone, or is another."""
     if path in CHANGED:
         return
     if isinstance(old, dict) and isinstance(new, dict):

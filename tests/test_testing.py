@@ -54,7 +54,7 @@ def message(assertion, *arguments, **how) -> list[str]:
 class TestAssertFree:
     def test_passes_what_is_free(self, scene):
         assert_free(scene, FREE)
-        assert_free(scene, [FREE, OUTSIDE])  # the boundary is no matter of it
+        assert_free(scene, [FREE, OUTSIDE])  # it does not look at the boundary
 
     def test_names_the_bodies_the_place_and_the_depth(self, scene):
         head, values, contact, *rest = message(assert_free, scene, DEEP)
@@ -189,7 +189,7 @@ class TestPlugin:
                 "E *cube and cube_2 (obstacle): 0.25 m deep at (*",
             ]
         )
-        # What is inside the assertion is no news to whoever wrote the test.
+        # What is inside the assertion is not news to the author of the test.
         result.stdout.no_fnmatch_line("*raise AssertionError*")
         result.stdout.no_fnmatch_line("*picture*")
 

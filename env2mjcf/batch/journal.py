@@ -32,7 +32,7 @@ from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock, unlock
+from ..system.locks import FolderBusyError, LockOutcome, folder_lock, try_lock, unlock
 
 _FORMAT = "env2mjcf batch 1"
 _BEGINNING = f'{{"format": "{_FORMAT}"'.encode()
@@ -63,7 +63,7 @@ class Progress:
     digest: str
 
 
-def companions(output: Path) -> tuple[Path, Path, Path]:
+def unfinished_files(output: Path) -> tuple[Path, Path, Path]:
     """Return the files that lie beside an output until it is whole: the partial one, its journal, the next journal."""
     partial, journal, fresh = (output.with_name(output.name + end) for end in (".partial", ".journal", ".journal.new"))
     return partial, journal, fresh
@@ -84,7 +84,7 @@ class Partial:
 
     def __init__(self, output: Path) -> None:
         self._output = output
-        self._partial, self._journal, self._fresh = companions(output)
+        self._partial, self._journal, self._fresh = unfinished_files(output)
         self._answers: np.memmap[Any, Any] | None = None
         with self._alone():
             self._read(self._fresh)
@@ -188,7 +188,7 @@ class Partial:
 
     def discard(self) -> None:
         """Leave nothing behind."""
-        with suppress(OSError, FolderBusyError), alone(self._output.parent):
+        with suppress(OSError, FolderBusyError), folder_lock(self._output.parent):
             if self._is_ours():
                 self._partial.unlink()
                 self._journal.unlink(missing_ok=True)
@@ -211,7 +211,7 @@ class Partial:
     @contextmanager
     def _alone(self) -> Generator[None]:
         try:
-            with alone(self._output.parent):
+            with folder_lock(self._output.parent):
                 yield
         except FolderBusyError as error:
             hint = "is a process stopped in the middle of writing there? End it, or choose another output"

@@ -21,7 +21,7 @@ from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..system.files import refuse_foreign, refuse_unwritable
 from ..system.imports import installed_version
-from .journal import Partial, Progress, companions
+from .journal import Partial, Progress, unfinished_files
 
 What = Literal["collision", "valid", "clearance"]
 WHAT: tuple[What, ...] = get_args(What)
@@ -43,7 +43,7 @@ class BatchResult:
         output: The file with one answer for each row.
         what: What was asked.
         rows: Number of rows.
-        counts: How many rows there are of each kind.
+        counts: How many rows are "in collision" and "free", or "valid" and "invalid".
         least: The least clearance in metres; None where clearance was not asked for, or there are no rows.
         resumed: Rows that an earlier run had answered.
         seconds: How long this run took for the others.
@@ -103,8 +103,8 @@ def run(
     source = open_rows(str(configurations), scene.space, file_units)
     target = Path(output)
     refuse_unwritable(target, "CFG509", [configurations])
-    for companion in companions(target):
-        refuse_unwritable(companion, "CFG509", [configurations])
+    for beside in unfinished_files(target):
+        refuse_unwritable(beside, "CFG509", [configurations])
     refuse_foreign(target, "CFG509", "a NumPy file", lambda beginning: beginning.startswith(MAGIC_PREFIX))
     count = None if executor is not None and threads is None else thread_count(threads, len(source))
     job = identity(scene, what, file_units)
@@ -123,6 +123,8 @@ def run(
 
 
 class _Work:
+    """A batch at work: what it asks, how far it is, and the digest of the rows that are done."""
+
     def __init__(self, scene: Scene, source: MappedRows, partial: Partial, job: str, what: What) -> None:
         questions = {"collision": scene.in_collision, "valid": scene.is_valid, "clearance": scene.clearance}
         self._ask: Callable[..., Any] = questions[what]

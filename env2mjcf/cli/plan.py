@@ -75,11 +75,11 @@ class Plan:
     def run(self) -> int:
         """Plan, and report; 1 if there is no solution in time, or start or goal are not valid."""
         from ..formats.path import begins_as_path
-        from ..planning.planners import installed
+        from ..planning.planners import checked_planner
         from ..planning.route import plan_through
 
         # Before anything is loaded and looked at, which may take a minute.
-        installed(self.planner)
+        checked_planner(self.planner)
         if self.out is not None:
             query = () if self.options.query is None else (self.options.query,)
             refuse_unwritable(self.out, "CFG542", (self.scene, *self.options.robots, *query))

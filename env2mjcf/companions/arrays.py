@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..kinematics.space import ConfigurationSpace
+from ..kinematics.space import ConfigurationSpace, listed
 from ..kinematics.transforms import Array
 from ..limits import LARGEST
 
@@ -54,11 +54,6 @@ class MappedRows:
         return self.space.decode(rows) if self.file_units else rows
 
 
-def listed_names(space: ConfigurationSpace) -> str:
-    """Return the names of the first degrees of freedom, for a message."""
-    return ", ".join(space.names[:12]) + (", ..." if space.dim > 12 else "")
-
-
 def open_rows(path: str, space: ConfigurationSpace, file_units: bool) -> MappedRows:
     """Map a NumPy file.
 
@@ -73,7 +68,7 @@ def open_rows(path: str, space: ConfigurationSpace, file_units: bool) -> MappedR
     if rows.ndim != 2 or rows.shape[1] != space.dim:
         if rows.shape == (space.dim,):
             hint = "one configuration is array.reshape(1, -1)"
-        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {listed_names(space)}"
+        message = f"{path} holds an array of shape {rows.shape}; expected (n, {space.dim}): {listed(space.names)}"
         log.fail("CFG505", path, message, hint=hint)
     return MappedRows(path, rows, space, file_units)
 

@@ -89,8 +89,7 @@ def of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagnos
     Paths (.path) and roadmaps (.map) are known by their text, too, whatever their names are.
 
     Raises:
-        FormatError: The file cannot be read, a row fits no robot, or there is none, which would be neither valid nor
-            invalid.
+        FormatError: The file cannot be read, a row fits no robot, or it holds no row.
         ValueError: A path or roadmap is to be in radians.
     """
     refuse_without_freedom(scene, scene.environment.path, log)

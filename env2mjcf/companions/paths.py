@@ -16,10 +16,11 @@ from ..formats.source import Source, read_source
 from ..kinematics.forward import configuration_of_poses
 from ..kinematics.transforms import Array, pose_gaps, rotation_matrix, transform
 from ..limits import Limits
+from ..model.dialects import begins_with_robot
 from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832
@@ -91,7 +92,7 @@ def path_record(scene: Scene, source: Source, log: DiagnosticLog) -> PathRecord:
         return _of_poses(scene, source, found, found.poses, log)
     rows: list[tuple[int, Sequence[float]]] = [(row.robot, row.configuration) for row in found.rows]
     if found.version in text.OF_TURNS:
-        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
+        rows = from_turns(scene, rows, source.path, source.line_span(1), log)
     q = configurations(scene, rows)
     robots = np.array([row.robot for row in found.rows], dtype=np.int64)
     none = np.zeros(len(q))
@@ -112,11 +113,13 @@ def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -
 
     Raises:
         ConversionError: The file cannot be written.
+        TypeError: The robot is not a whole number.
         ValueError: q has a wrong shape or a value that is not finite, or there is no such robot.
     """
     rows = file_numbers(scene, q, robot)
     version = text.TURNS if scene.environment.dialect is Dialect.A else text.CURRENT
-    return write(file, text.path_text(rows, version, written_index(scene, robot)))
+    index = robot if begins_with_robot(scene.environment) else None
+    return write(file, text.path_text(rows, version, index))
 
 
 def _pose_counts(scene: Scene) -> list[int]:

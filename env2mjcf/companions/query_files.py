@@ -19,7 +19,7 @@ from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Dialect, Task
-from ..options import PathArgument
+from ..options import PathArgument, whole
 from ..simulation.scene import Query, Scene
 from ..system.files import output
 
@@ -63,7 +63,7 @@ def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgume
     if not any(len(q.q) for q in listed):
         raise ValueError("queries hold no configuration; expected a start and a goal")
     tasks = [Task(q.robot, tuple(map(tuple, file_numbers(scene, q.q, q.robot)))) for q in listed]
-    return write(file, text.query_text(tasks, index=written_index(scene, 0) is not None))
+    return write(file, text.query_text(tasks, index=begins_with_robot(scene.environment)))
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -84,7 +84,7 @@ def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) ->
     return q
 
 
-def out_of_turns(
+def from_turns(
     scene: Scene, rows: Sequence[tuple[int, Sequence[float]]], file: str, span: Span, log: DiagnosticLog
 ) -> list[tuple[int, Sequence[float]]]:
     """Return rows of dialect A's time, whose angles are turns, in the units of the scene's dialect.
@@ -108,21 +108,17 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
     because not every double is a multiple of pi.
 
     Raises:
+        TypeError: The robot is not a whole number.
         ValueError: q has a wrong shape, a value that is not finite or too large, or there is no such robot.
     """
     space = scene.space
     count = len(space.robot_slices)
-    if not 0 <= robot < count:
+    if not 0 <= whole("robot", robot, 0) < count:
         raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
     numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, space.robot_slices[robot]]
     if (np.abs(numbers) > LARGEST).any():
         raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
     return numbers.tolist()
-
-
-def written_index(scene: Scene, robot: int) -> int | None:
-    """Return the index that a robot's configurations begin with; None where the dialect writes none."""
-    return robot if begins_with_robot(scene.environment) else None
 
 
 def write(file: PathArgument, text: str) -> Path:

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ..diagnostics import DiagnosticLog
 from ..formats.rows import check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
+from ..kinematics.space import listed
 from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
-from .arrays import coordinates, listed_names, map_array
+from .arrays import coordinates, map_array
 from .query_files import dofs_of
 
 _WORD = re.compile(r"[^,;\s]+")
@@ -102,7 +103,7 @@ def expected(scene: Scene) -> str:
     space = scene.space
     if not space.dim:
         return "none: the scene has no robot that moves"
-    names, dofs = listed_names(space), dofs_of(scene)
+    names, dofs = listed(space.names), dofs_of(scene)
     if len(dofs) == 1:
         return f"{space.dim} ({names})"
     each = ", ".join(f"{d} for robot {i}" for i, d in enumerate(dofs))

@@ -20,9 +20,10 @@ from ..formats.lexer import parse_number
 from ..formats.source import Source, read_source
 from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
+from ..model.dialects import begins_with_robot
 from ..options import PathArgument, whole
 from ..simulation.scene import Scene
-from .query_files import configurations, dofs_of, file_numbers, out_of_turns, write, written_index
+from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 Indices = NDArray[np.int64]
 Rows = list[tuple[int, Sequence[float]]]
@@ -151,7 +152,7 @@ def roadmap_record(scene: Scene, source: Source, log: DiagnosticLog) -> Roadmap:
     edges = np.array([pair for pair, _ in kept], dtype=np.int64).reshape(-1, 2)
     between: Rows = [(int(robots[i]), row) for (i, _), edge in kept for row in edge.intermediates]
     if found.header.of_turns:
-        rows = out_of_turns(scene, rows, source.path, source.line_span(1), log)
+        rows = from_turns(scene, rows, source.path, source.line_span(1), log)
     stops = np.cumsum([0, *(len(edge.intermediates) for _, edge in kept)])
     q, corners = configurations(scene, rows), configurations(scene, between)
     info = np.array([(*n.info, *[np.nan] * (3 - len(n.info))) for n in nodes], dtype=np.float64).reshape(-1, 3)
@@ -189,8 +190,8 @@ def write_roadmap(scene: Scene, roadmap: Roadmap, file: PathArgument) -> Path:
     named = roadmap.header.environment or Path(scene.environment.path).name
     if not (np.abs(roadmap.weights) <= LARGEST).all():
         raise ValueError(f"weights that are not finite, or beyond {LARGEST:g}; no file can hold them")
-    index = written_index(scene, 0) is not None
-    return write(file, text.roadmap_text(_nodes(scene, roadmap), named, index=index))
+    nodes = _nodes(scene, roadmap)
+    return write(file, text.roadmap_text(nodes, named, index=begins_with_robot(scene.environment)))
 
 
 def _pairs(edges: ArrayLike) -> Indices:

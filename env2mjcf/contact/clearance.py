@@ -16,7 +16,10 @@ from .surfaces import Surfaces
 # Pairs of bodies that are looked at together: enough for numpy to be busy, few enough to stay in memory.
 _JOBS = 4096
 
-# What counts as no distance, in extents: far below the band of 1e-6, far above rounding.
+BAND = 1e-5
+"""Bodies nearer than this, in extents, may touch by the verdicts: cells and triangles differ by no more."""
+
+# What counts as no distance, in extents: far below the band, far above rounding.
 _TOUCH_PER_EXTENT = 1e-13
 
 

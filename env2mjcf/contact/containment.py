@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
-from ..geometry.orientation import winding_numbers
+from ..geometry.orientation import encloses_any
 from ..kinematics.transforms import Array
 from ..model.environment import Boundary
 from ..pairs import Pair
@@ -44,7 +44,9 @@ class Containment:
             for outer, inner in ((pair.link, pair.other), (pair.other, pair.link)):
                 shape = parts[outer].shape
                 if shape is not None and shape.needs_containment:
-                    self._probes.append(_Probe(i, outer, inner, _component_points(parts[inner])))
+                    mesh = parts[inner].analysis
+                    first = np.unique(mesh.component, return_index=True)[1]
+                    self._probes.append(_Probe(i, outer, inner, mesh.vertices[mesh.faces[first, 0]]))
 
     @property
     def needed(self) -> bool:
@@ -70,17 +72,7 @@ class Containment:
         world = np.einsum("nij,cj->nci", inner[:, :3, :3], probe.points) + inner[:, None, :3, 3]
         local = np.einsum("nji,ncj->nci", outer[:, :3, :3], world - outer[:, None, :3, 3])
         analysis = self._parts[probe.outer].analysis
-        near = np.all((local > analysis.vertices.min(axis=0)) & (local < analysis.vertices.max(axis=0)), axis=-1)
-        inside = np.zeros(near.shape, dtype=bool)
-        if near.any():
-            inside[near] = np.abs(winding_numbers(local[near], analysis.vertices, analysis.faces)) > 0.5
-        return np.asarray(inside.any(axis=-1))
-
-
-def _component_points(part: Part) -> Array:
-    analysis = part.analysis
-    _, first = np.unique(analysis.component, return_index=True)
-    return analysis.vertices[analysis.faces[first, 0]]
+        return encloses_any(analysis.vertices, analysis.faces, local)
 
 
 class BoundaryTest:

@@ -10,11 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
 from ..kinematics.transforms import Array
-from ..kinematics.tree import DofKind
+from ..kinematics.tree import POSITIONS, ROTATIONS, DofKind
+from ..options import positive
 from ..pairs import Pair
-
-_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
-_ROTATIONS = (DofKind.RX, DofKind.RY, DofKind.RZ)
 
 # Without a resolution in the file, a step is this fraction of the extent.
 _DEFAULT_RESOLUTION = 0.01
@@ -32,7 +30,7 @@ class EdgeSteps:
         self._motion = MotionBounds(assembly, space)
 
     @property
-    def usual(self) -> float:
+    def default_resolution(self) -> float:
         """The step in metres where neither the caller nor the file gives one: 0.01 extent."""
         return _DEFAULT_RESOLUTION * self._assembly.extent
 
@@ -40,14 +38,13 @@ class EdgeSteps:
         """Return the step in metres: the one given, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            ValueError: The resolution is not a positive number.
+            TypeError: The resolution is not a number.
+            ValueError: It is not positive, or not finite.
         """
         if resolution is None:
             of_file = self._assembly.environment.resolution.position
-            return of_file if of_file else self.usual
-        if not 0 < resolution < float("inf"):
-            raise ValueError(f"resolution is {resolution}; expected a positive length in metres")
-        return resolution
+            return of_file if of_file else self.default_resolution
+        return positive("resolution", resolution)
 
     def counts(self, start: Array, delta: Array, resolution: float | None) -> NDArray[np.int64]:
         """Return how many configurations are checked on ways from (n, dim) by (n, dim), ends included, (n,)."""
@@ -90,7 +87,13 @@ def even_rows(start: Array, delta: Array, counts: NDArray[np.int64], at: NDArray
 
 
 class MotionBounds:
-    """Bounds of motion from distances along the chains of links."""
+    """Bounds how far links move on straight ways: a point moves no further than its chain is long, for each radian.
+
+    Args:
+        assembly: The scene.
+        space: Its configuration space.
+        pairs: Pairs of links that `pairs` tells about.
+    """
 
     def __init__(self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair] = ()) -> None:
         self._robots = assembly.robots
@@ -130,9 +133,9 @@ class MotionBounds:
             # Links of robots with several bases have no translation in common.
             if len(robot.kinematics.tree.bases) == 1:
                 for i, kind in enumerate(self._kinds[columns]):
-                    if kind in _TRANSLATIONS and robot.kinematics.dofs[i].connection is None:
+                    if kind in POSITIONS and robot.kinematics.dofs[i].connection is None:
                         moved = delta[:, columns.start + i]
-                        drifts[:, link : link + len(robot.links), _TRANSLATIONS.index(kind)] = moved[:, None]
+                        drifts[:, link : link + len(robot.links), POSITIONS.index(kind)] = moved[:, None]
                         rest[:, columns.start + i] = 0.0
             link += len(robot.links)
         return drifts, self.links(start, rest)
@@ -177,8 +180,8 @@ class MotionBounds:
         turns = np.abs(delta)
         for columns in self._bases:
             by_kind = {self._kinds[c]: c for c in columns}
-            along = [by_kind[k] for k in _TRANSLATIONS if k in by_kind]
-            about = [by_kind[k] for k in _ROTATIONS if k in by_kind]
+            along = [by_kind[k] for k in POSITIONS if k in by_kind]
+            about = [by_kind[k] for k in ROTATIONS if k in by_kind]
             if along:
                 turns[:, along[0]], turns[:, along[1:]] = np.linalg.norm(turns[:, along], axis=1), 0.0
             if len(about) == 3:

@@ -39,7 +39,7 @@ class Parcel:
     """A scene's queries as bytes.
 
     Attributes:
-        digest: SHA-256 of the content: equal names mean equal bytes.
+        digest: SHA-256 of the content.
         content: Compressed pickle.
     """
 
@@ -57,7 +57,7 @@ class Task:
         question: The question, with the columns of these rows.
     """
 
-    scene: Any
+    scene: str | ContactQueries
     content: bytes | None
     question: Question
 
@@ -135,7 +135,7 @@ def on_executor(
     """
     if not callable(getattr(executor, "submit", None)):
         expected = "a concurrent.futures.Executor, such as ProcessPoolExecutor() or dask's Client(...).get_executor()"
-        raise TypeError(f"executor is a {type(executor).__name__}; expected {expected}")
+        raise TypeError(f"executor is {executor!r}; expected {expected}")
     # Derived classes may be something else: interpreters share no objects.
     here = type(executor) is ThreadPoolExecutor
     scene = queries if here else parcel(queries).digest

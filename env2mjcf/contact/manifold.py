@@ -13,8 +13,8 @@ from ..geometry.topology import Floats
 from ..geometry.triangle_search import Jobs, Search
 from ..kinematics.transforms import Array
 from ..pairs import Pair
-from .clearance import Clearance
-from .separation import separations
+from .clearance import BAND, Clearance
+from .separation import nearest_points, separations
 from .surfaces import Surface, Surfaces, unit_normals
 from .types import Contact
 
@@ -22,8 +22,6 @@ from .types import Contact
 _MOST = 8
 # Contacts nearer than this, in sizes of the smaller body, whose normals are within about 18 degrees, are one.
 _NEAR, _ALIKE = 0.05, 0.95
-# Cells and triangles may differ by the band of verdicts, in extents.
-_BAND = 1e-5
 _BLOCK = 4096
 
 
@@ -50,7 +48,7 @@ class Manifolds:
         self._pairs = pairs
         self._surfaces = surfaces
         self._clearance = clearance
-        self._band = _BAND * extent
+        self._band = BAND * extent
         self._sizes = {n: p.mesh.diagonal for n, p in parts.items()}
         self._hulls = {n: _only_hulls(p) for n, p in parts.items()}
 
@@ -103,10 +101,8 @@ class Manifolds:
 
     def _apart_or_inside(self, job: Jobs, pose: Array) -> Touch:
         """Return the nearest points of surfaces that do not touch, and how deep one is inside the other, if it is."""
-        trees, touch = self._surfaces.trees, self._clearance.touch
-        found = Search(trees, job, np.array([np.inf]), touch).run()
-        moved = trees.triangles[found.triangle_b] @ job.rotation[0].T + job.translation[0]
-        points = nearest(trees.triangles[found.triangle_a], moved)
+        touch = self._clearance.touch
+        points = nearest_points(self._surfaces, job, touch)
         position = pose[:3, :3] @ ((points.on_a[0] + points.on_b[0]) / 2) + pose[:3, 3]
         if self._surfaces.contained(job)[0]:
             depth, push = separations(self._surfaces, job, np.zeros((0, 3), dtype=np.int64), touch)

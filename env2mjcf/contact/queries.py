@@ -16,8 +16,8 @@ from ..geometry.assembly import Part
 from ..kinematics.transforms import Array
 from ..options import Collision, Engine
 from ..pipeline import Compiled
-from ..system.locks import Lock, lasting
-from .clearance import Clearance
+from ..system.locks import Lock, lazy_property
+from .clearance import BAND, Clearance
 from .containment import BoundaryTest, Containment
 from .edges import EdgeSteps, MotionBounds, certified, even_rows
 from .exact.engine import ExactEngine, available, compile_all
@@ -26,8 +26,6 @@ from .mujoco_engine import MujocoEngine, static_contacts
 from .surfaces import Surfaces
 from .types import BrokenLimit, Contact, PackedContacts, Reason, Verdict, deepest
 
-# Bodies nearer than this, in extents, may touch by the verdicts.
-_BAND = 1e-5
 # Configurations of edges that are made at once.
 _BLOCK = 10_000
 
@@ -157,7 +155,7 @@ class ContactQueries:
         if self._always or self._constant_clearance <= 0:
             return np.zeros(len(start), dtype=bool)
         links, pairs = self._motion.links(start, delta), self._motion.pairs(start, delta)
-        band = _BAND * self._assembly.extent
+        band = BAND * self._assembly.extent
         exact = self._chosen(None)
         if exact is not None:
             return exact.edges_are_free(start, delta, links, *self._motion.split(start, delta), pairs, band)
@@ -181,7 +179,7 @@ class ContactQueries:
     def _moving_clearances(self, rows: Array) -> Array:
         return self._triangles.moving.signed(self._poses_by_name(rows), len(rows))
 
-    @lasting
+    @lazy_property
     def _always(self) -> bool:
         """Whether bodies that cannot move against each other touch, or are inside each other: always, then."""
         if self._static or not self._containment.needed:
@@ -189,7 +187,7 @@ class ContactQueries:
         inside = self._containment.pairs_inside(self._poses_by_name(self._space.home[None]))
         return any(self._pairs[i].constant for i, _ in inside)
 
-    @lasting
+    @lazy_property
     def _constant_clearance(self) -> float:
         """Distance of the pairs that cannot move against each other."""
         return float(self._triangles.constant.signed(self._poses_by_name(self._space.home[None]), 1)[0])
@@ -217,10 +215,6 @@ class ContactQueries:
         engine = engine or self._default
         return engine == "exact" or (engine == "auto" and self._compiles)
 
-    def pair_index(self, contact: Contact) -> int:
-        """Return which of the tested pairs a contact is of."""
-        return self._pair_of[frozenset((contact.link, contact.other))]
-
     def contacts(self, row: Array, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches."""
         exact = self._chosen(engine)
@@ -245,6 +239,18 @@ class ContactQueries:
             # Within the band of contact, cells may part what triangles say touches.
             others = self._triangles.clearance.nearest_pairs(poses)
         return self._triangles.manifolds.contacts(found, others, poses)
+
+    def packed_contacts(self, rows: Array, engine: Engine | None = None) -> PackedContacts:
+        """Return the contacts of configurations (n, dim)."""
+        each = [self.contacts(row, engine) for row in rows]
+        found = [c for contacts in each for c in contacts]
+        return PackedContacts(
+            np.cumsum([0, *map(len, each)], dtype=np.int64),
+            np.array([self._pair_of[frozenset((c.link, c.other))] for c in found], dtype=np.int64),
+            np.array([c.position for c in found], dtype=np.float64).reshape(-1, 3),
+            np.array([c.normal for c in found], dtype=np.float64).reshape(-1, 3),
+            np.array([c.distance for c in found], dtype=np.float64),
+        )
 
     def out_of_bounds(self, row: Array) -> tuple[Reason, ...]:
         """Return the limits that one configuration, (dim,), breaks, and the links that reach beyond the boundary."""
@@ -284,7 +290,7 @@ class ContactQueries:
             by_name[part.name] = np.broadcast_to(part.pose, (len(poses), 4, 4))
         return by_name
 
-    @lasting
+    @lazy_property
     def _surfaces(self) -> Surfaces:
         return Surfaces(self._parts, self._collision)
 
@@ -306,25 +312,12 @@ class ContactQueries:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Triangles:
-    """What works on triangles instead of cells."""
+    """What works on triangles instead of cells: for all pairs, those that move, and those that are constant."""
 
     clearance: Clearance
     moving: Clearance
     constant: Clearance
     manifolds: Manifolds
-
-
-def packed(queries: ContactQueries, rows: Array, engine: Engine | None = None) -> PackedContacts:
-    """Return the contacts of configurations (n, dim)."""
-    each = [queries.contacts(row, engine) for row in rows]
-    found = [c for contacts in each for c in contacts]
-    return PackedContacts(
-        np.cumsum([0, *(len(contacts) for contacts in each)], dtype=np.int64),
-        np.array([queries.pair_index(c) for c in found], dtype=np.int64),
-        _vectors([c.position for c in found]),
-        _vectors([c.normal for c in found]),
-        np.array([c.distance for c in found], dtype=np.float64),
-    )
 
 
 def joined(parts: Sequence[PackedContacts]) -> PackedContacts:
@@ -334,7 +327,3 @@ def joined(parts: Sequence[PackedContacts]) -> PackedContacts:
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),
         *(np.concatenate([getattr(p, field) for p in parts]) for field in ("pair", "position", "normal", "distance")),
     )
-
-
-def _vectors(rows: list[Array]) -> Array:
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)

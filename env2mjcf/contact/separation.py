@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from ..geometry.distance import nearest
+from ..geometry.distance import Nearest, nearest
 from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs, Search
 from ..geometry.triangle_sweep import escapes
@@ -80,9 +80,9 @@ def separations(surfaces: Surfaces, jobs: Jobs, touching: Ints, touch: float) ->
             square = _shortest(first, second, _square_to(_edges(first), _edges(second)))
             chosen, offset = np.concatenate([normals, -normals, square, directions[order[:_OTHERS]]]), 0.0
         else:
-            towards, gap = _nearest(surfaces, jobs.only(np.array([k])), touch)
+            points = nearest_points(surfaces, jobs.only(np.array([k])), touch)
             # Just beyond where they begin to touch.
-            chosen, offset = towards, gap * (1 + 1e-9) + 10 * touch
+            chosen, offset = unit(points.on_b - points.on_a), float(points.distance[0]) * (1 + 1e-9) + 10 * touch
         trials += [(k, d, offset) for d in chosen if d.any()]
     if trials:
         job, direction, offset = zip(*trials, strict=True)
@@ -143,11 +143,10 @@ def _shortest(first: Floats, second: Floats, axes: Floats) -> Floats:
     return np.take_along_axis(axes, best[..., None], axis=1).reshape(-1, 3)
 
 
-def _nearest(surfaces: Surfaces, job: Jobs, touch: float) -> tuple[Floats, float]:
-    """Return the unit vector, (1, 3), from the nearest point of a to that of b, and their distance."""
+def nearest_points(surfaces: Surfaces, job: Jobs, touch: float) -> Nearest:
+    """Return where the surfaces of one job, which do not touch, are nearest to each other, in the frame of a."""
     alone = Jobs(job.a, job.b, job.rotation, job.translation, np.zeros(1, dtype=np.int64))
     found = Search(surfaces.trees, alone, np.array([np.inf]), touch).run()
     triangles = surfaces.trees.triangles
     moved = triangles[found.triangle_b] @ job.rotation[0].T + job.translation[0]
-    points = nearest(triangles[found.triangle_a], moved)
-    return unit(points.on_b - points.on_a), float(points.distance[0])
+    return nearest(triangles[found.triangle_a], moved)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.assembly import Part
 from ..geometry.convexity import Box
-from ..geometry.orientation import winding_numbers
+from ..geometry.orientation import encloses_any
 from ..geometry.pieces import hull_triangles
 from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs
@@ -45,27 +45,30 @@ class Surface:
 
 
 class Surfaces:
-    """The surfaces of all bodies that have a shape, and a tree over each."""
+    """The surfaces of all bodies that have a shape, and a tree over each; bodies of one shape share both.
+
+    Attributes:
+        index: Place of a body, by its name, in `tree`.
+        tree: (n,) which tree is over each body's surface.
+        trees: The trees.
+    """
 
     def __init__(self, parts: Mapping[str, Part], collision: Collision) -> None:
         self.index: dict[str, int] = {}
-        self.of_body: list[Surface] = []
         numbers: dict[int, int] = {}
-        distinct: list[Surface] = []
+        self._distinct: list[Surface] = []
         tree: list[int] = []
         for name, part in parts.items():
             if part.shape is None:
                 continue
             key = id(part.shape)
             if key not in numbers:
-                numbers[key] = len(distinct)
-                distinct.append(_surface(part, collision))
+                numbers[key] = len(self._distinct)
+                self._distinct.append(_surface(part, collision))
             self.index[name] = len(tree)
-            self.of_body.append(distinct[numbers[key]])
             tree.append(numbers[key])
-        self.trees: Forest = forest([s.triangles for s in distinct])
+        self.trees: Forest = forest([s.triangles for s in self._distinct])
         self.tree: Ints = np.array(tree, dtype=np.int64)
-        self._distinct = distinct
 
     def surface(self, tree: int) -> Surface:
         """Return the surface that a tree is over."""
@@ -90,13 +93,8 @@ class Surfaces:
 
 def _inside(solid: Surface, points: Floats) -> Bools:
     """Return whether any of each row's points, (n, c, 3), is in a solid, (n,)."""
-    lower, upper = solid.corners.min(axis=0), solid.corners.max(axis=0)
-    near = ((points > lower) & (points < upper)).all(axis=-1)
-    inside = np.zeros(near.shape, dtype=np.bool_)
-    if near.any():
-        faces = np.arange(3 * len(solid.triangles)).reshape(-1, 3)
-        inside[near] = np.abs(winding_numbers(points[near], solid.triangles.reshape(-1, 3), faces)) > 0.5
-    return np.asarray(inside.any(axis=-1))
+    faces = np.arange(3 * len(solid.triangles)).reshape(-1, 3)
+    return encloses_any(solid.triangles.reshape(-1, 3), faces, points)
 
 
 def _surface(part: Part, collision: Collision) -> Surface:

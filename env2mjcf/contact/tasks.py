@@ -1,4 +1,4 @@
-"""How much to do at a time: ranges of rows, cut by what the ones before them cost."""
+"""What is asked about rows, and how many at a time: ranges of rows, cut by what the ones before them cost."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import os
 import sys
 import threading
@@ -12,7 +11,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ..system.locks import working
+from ..options import whole
+from ..system.locks import delayed_exit
 from .executors import on_executor, worker_count
 from .queries import ContactQueries
 from .tasks import Chunks, Question, Store
@@ -27,13 +27,12 @@ def thread_count(threads: int | None, rows: int) -> int:
     """Return how many threads to use: as many as given, else 1 for few rows and all cores for many.
 
     Raises:
-        ValueError: The number of threads is below 1.
+        TypeError: The number of threads is not a whole number.
+        ValueError: It is below 1.
     """
     if threads is None:
         return 1 if rows < _ROWS_FOR_THREADS else os.cpu_count() or 1
-    if operator.index(threads) < 1:
-        raise ValueError(f"threads is {threads}; expected at least 1")
-    return threads
+    return whole("threads", threads, 1)
 
 
 def ask(
@@ -56,7 +55,7 @@ def ask(
 
     Raises:
         ValueError: The number of threads is below 1.
-        TypeError: The executor is not an Executor.
+        TypeError: It is not a whole number, or the executor is not an Executor.
     """
     rows = question.rows
     count = thread_count(threads, rows)
@@ -88,7 +87,7 @@ def _in_threads(queries: ContactQueries, question: Question, store: Store, count
         try:
             while (rows := chunks.take()) is not None:
                 began = time.perf_counter()
-                with working():
+                with delayed_exit():
                     store(rows, question.answers(queries, rows))
                 chunks.took(rows.stop - rows.start, time.perf_counter() - began)
         finally:

@@ -64,6 +64,14 @@ def encloses(vertices: Floats, faces: Ints, points: Floats, work: Work | None = 
     return np.abs(winding_numbers(points, vertices, faces, work)) > 0.5
 
 
+def encloses_any(vertices: Floats, faces: Ints, points: Floats) -> Bools:
+    """Tell for each row of points (n, c, 3) whether the surface winds around one of them, (n,)."""
+    near = ((points > vertices.min(axis=0)) & (points < vertices.max(axis=0))).all(axis=-1)
+    inside = np.zeros(near.shape, dtype=np.bool_)
+    inside[near] = encloses(vertices, faces, points[near])
+    return np.asarray(inside.any(axis=-1))
+
+
 def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, work: Work) -> Bools:
     """Tell which components of a closed, consistently wound surface are wound inside out, (c,).
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
 from ..model.environment import BaseKind, DHForm, Dialect, MultiBody, Pose
-from ..system.locks import lasting
+from ..system.locks import lazy_property
 from .transforms import (
     Array,
     angles_from_quaternion,
@@ -176,7 +176,7 @@ class RobotKinematics:
         rotation = rotation_matrix(*(value.get(k, zeros) for k in ROTATIONS))
         return transform(rotation, np.stack([value.get(k, zeros) for k in POSITIONS], axis=-1))
 
-    @lasting
+    @lazy_property
     def _columns(self) -> dict[tuple[int, DofKind], int]:
         return {(d.connection, d.kind): i for i, d in enumerate(self.dofs) if d.connection is not None}
 

@@ -14,12 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model.dialects import RULES
 from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
+from ..options import whole
 from .forward import RobotKinematics
 from .transforms import Array, angles_from_quaternion, quaternion_from_angles, real_array, wrap
 from .tree import POSITIONS, DofKind
 
-# More names than these are not listed in a message.
-_LISTED = 12
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first twelve names of degrees of freedom, for a message."""
+    return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,8 @@ class Slot:
 class ConfigurationSpace:
     """Limits, units and topology of a scene's degrees of freedom.
 
+    Configurations of a wrong shape, or with a value that is not finite, are a ValueError.
+
     Args:
         robots: All robots.
         names: One name for each degree of freedom.
@@ -56,6 +61,7 @@ class ConfigurationSpace:
         lower, upper: (dim,) limits in radians and metres; infinite where there are none.
         periodic: (dim,) whether the degree of freedom is an angle that turns without end.
         home: (dim,) the configuration that the files describe.
+        nq: Length of MuJoCo's qpos.
     """
 
     def __init__(
@@ -86,7 +92,6 @@ class ConfigurationSpace:
         )
         base = [d.kind if d.connection is None and d.kind.is_length else None for d in dofs]
         self._axis = np.array([-1 if k is None else POSITIONS.index(k) for k in base], dtype=np.int64)
-        self._is_length = np.array([d.kind.is_length for d in dofs], dtype=bool)
         self._bound_bases(boundary)
         self._slots, self.nq = _layout(robots, self.robot_slices)
         self._sample_box = sample_box
@@ -189,7 +194,7 @@ class ConfigurationSpace:
         from twice that radius where there are no obstacles.
         """
         lower, upper = self.sample_limits
-        return np.random.default_rng(seed).uniform(lower, upper, size=(n, self.dim))
+        return np.random.default_rng(seed).uniform(lower, upper, size=(whole("n", n, 0), self.dim))
 
     @property
     def sample_limits(self) -> tuple[Array, Array]:
@@ -221,7 +226,7 @@ class ConfigurationSpace:
         return start + np.linspace(0.0, 1.0, n)[:, None] * delta
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Array:
-        """Return the way from q0 to q1, (..., dim): the short way round on periodic degrees of freedom."""
+        """Return the way from q0 to q1, (dim,) or (n, dim): the short way round on periodic degrees of freedom."""
         delta = self.check(q1) - self.check(q0)
         return np.where(self.periodic, wrap(delta), delta)
 
@@ -259,8 +264,7 @@ class ConfigurationSpace:
         return f"<ConfigurationSpace of {self.dim} degrees of freedom{self._listed()}>"
 
     def _listed(self) -> str:
-        more = ", ..." if self.dim > _LISTED else ""
-        return f": {', '.join(self.names[:_LISTED])}{more}" if self.dim else ""
+        return f": {listed(self.names)}" if self.dim else ""
 
     def _last_axis(self, values: ArrayLike, what: str) -> Array:
         array = real_array(values, what, self.names)

@@ -183,11 +183,6 @@ def _joint_dofs(connection: Connection, index: int, loop: bool, periodic: bool) 
     return dofs
 
 
-def dof_name(link: str, dof: Dof) -> str:
-    """Return the name of a degree of freedom: `link.theta`, or `link.theta(loop)` where it moves nothing."""
-    return f"{link}.{dof.kind}{'(loop)' if dof.loop else ''}"
-
-
 def dof_names(links: tuple[str, ...], dofs: Iterable[Dof]) -> tuple[str, ...]:
-    """Return unique names for a robot's degrees of freedom."""
-    return tuple(unique(dof_name(links[d.body], d) for d in dofs))
+    """Return unique names for a robot's degrees of freedom: `link.theta`, or `link.theta(loop)` if it moves nothing."""
+    return tuple(unique(f"{links[d.body]}.{d.kind}{'(loop)' if d.loop else ''}" for d in dofs))

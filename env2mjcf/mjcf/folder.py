@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from ..system.files import NoRegularFileError, beside, open_regular, replaced
-from ..system.locks import FolderBusyError, LockOutcome, alone, try_lock
+from ..system.locks import FolderBusyError, LockOutcome, folder_lock, try_lock
 from .markup import ASSET_FOLDER, files_mentioned
 
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
@@ -55,7 +55,7 @@ class Staged:
         self._begun = False
         (folder / ASSET_FOLDER).mkdir(parents=True, exist_ok=True)
         try:
-            with alone(folder):
+            with folder_lock(folder):
                 with suppress(OSError):
                     _remove_stale(folder)
                 self._begun = True
@@ -84,7 +84,7 @@ class Staged:
             FolderBusyError: Another process does not let anybody write.
             OSError: It cannot be renamed; `discard` then removes what was written.
         """
-        with alone(self.folder):
+        with folder_lock(self.folder):
             self._close()
             self._retire()
             os.replace(self.path, self.final)
@@ -114,7 +114,7 @@ class Staged:
         self._close()
         if not self._begun:
             return
-        with suppress(OSError, FolderBusyError), alone(self.folder):
+        with suppress(OSError, FolderBusyError), folder_lock(self.folder):
             _remove(self.folder, self.path, self._made)
             self._remove_retired()
 

@@ -1,4 +1,4 @@
-"""A scene in other units of length; apart from its dataclasses, which are read as a description of the format."""
+"""A scene in other units of length."""
 
 from __future__ import annotations
 

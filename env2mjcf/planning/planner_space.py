@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ..contact.edges import MotionBounds
 from ..kinematics.transforms import Array
-from ..kinematics.tree import DofKind
+from ..kinematics.tree import POSITIONS
 from ..simulation.scene import Scene
 
-_TRANSLATIONS = (DofKind.X, DofKind.Y, DofKind.Z)
 # What moves nothing (a degree of freedom that only closes a loop) weighs this part of what moves most: its way counts
 # for hardly anything, and yet configurations that differ in it are not the same.
 _LEAST = 1e-3
@@ -147,7 +146,7 @@ def _groups(scene: Scene) -> Iterator[tuple[int, ...]]:
         dofs = robot.kinematics.dofs
         bases: dict[int, list[int]] = {}
         for i, dof in enumerate(dofs):
-            if dof.connection is None and dof.kind in _TRANSLATIONS:
+            if dof.connection is None and dof.kind in POSITIONS:
                 bases.setdefault(dof.body, []).append(columns.start + i)
         yield from map(tuple, bases.values())
         taken = {c for base in bases.values() for c in base}
@@ -223,14 +222,12 @@ def _bisecting(steps: int) -> Array:
     return _remembered(steps) if steps <= _SHORT else _times(steps)
 
 
-@lru_cache(maxsize=_SHORT)
-def _remembered(steps: int) -> Array:
-    return _times(steps)
-
-
 def _times(steps: int) -> Array:
     strides = [1 << k for k in range((steps - 1).bit_length(), 0, -1)]
     indices = np.concatenate([[steps], *(np.arange(stride // 2, steps, stride) for stride in strides)])
     times = indices[:, None] / steps
     times.setflags(write=False)
     return times
+
+
+_remembered = lru_cache(maxsize=_SHORT)(_times)

@@ -36,8 +36,8 @@ OPTIMISING = ("RRTstar", "PRMstar")
 PLANNERS = ("auto", *OMPL_PLANNERS, BATCH)
 
 
-def installed(name: str) -> str:
-    """Return the name of a planner as it is listed, whatever its case; OMPL's own names will do.
+def checked_planner(name: str) -> str:
+    """Return the name of a planner that can be used, as it is listed; any case, and OMPL's own names, will do.
 
     Raises:
         TypeError: It is not a word.

@@ -108,8 +108,8 @@ class Timekeeper:
         self._counted: list[Validity] = []
         self.leg, self.doing = 1, "planning"
 
-    def counts(self, validity: Validity) -> Validity:
-        """Let what is checked there count, and return it."""
+    def counted(self, validity: Validity) -> Validity:
+        """Count what is checked there, too, and return it."""
         self._counted.append(validity)
         return validity
 

@@ -15,7 +15,7 @@ from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.locks import Lock
 from .planner_space import PlanningSpace
-from .planners import installed
+from .planners import checked_planner
 from .result import Plan, Progress, Timekeeper
 from .segment import Segment, SegmentPlanner
 
@@ -57,7 +57,7 @@ def plan(
             takes the file's PositionRes, else 0.01 extent. Where a solution turns out to pass over something, it is
             planned anew with finer steps.
         shorten: Make the path shorter.
-        progress: Called a few times a second.
+        progress: Called with a `Progress` a few times a second.
 
     Raises:
         TypeError: planner is not a name, or robot, time, seed or resolution not a number of the right kind.
@@ -89,7 +89,7 @@ def plan_through(
 
     With `robot`, the others stay as they are in the first configuration.
     """
-    rows, name = scene.space.check(q), installed(planner)
+    rows, name = scene.space.check(q), checked_planner(planner)
     _refuse(scene, rows, robot, time, seed)
     step = _step(scene, resolution)
     columns = _columns(scene, robot)
@@ -137,7 +137,7 @@ def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
 
 def _step(scene: Scene, resolution: float | None) -> float:
     """Return the planner's step in metres."""
-    step = scene.resolution(None if resolution is None else positive("resolution", resolution))
+    step = scene.resolution(resolution)
     least = _FINEST * scene.extent
     if step >= least:
         return step

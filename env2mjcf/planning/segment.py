@@ -1,4 +1,4 @@
-"""One segment of a path, from a start to a goal: found, mended where it passes over something, shortened, proved."""
+"""One segment of a path, which reports call a leg: found, mended where it passes over something, shortened, proved."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class SegmentPlanner:
 
     def __post_init__(self) -> None:
         self._by = self.planner
-        self._fine = self.watch.counts(Validity(self.scene, self.space, self.resolution / _FINER))
+        self._fine = self.watch.counted(Validity(self.scene, self.space, self.resolution / _FINER))
 
     def plan(self, start: Array, goal: Array) -> Segment:
         """Return a way from start to goal, (d,) each, both valid; or the best approach."""
@@ -96,8 +96,8 @@ class SegmentPlanner:
         seed = int(self.seeds.spawn(1)[0].generate_state(1)[0] >> 1)
         runs: list[CountedRun] = []
         for name in AUTO if planner == "auto" else (planner,):
-            validity = self.watch.counts(Validity(self.scene, self.space, resolution))
-            runs.append(_run(name, self.space, validity, start, goal, seed))
+            validity = self.watch.counted(Validity(self.scene, self.space, resolution))
+            runs.append(_begun(name, self.space, validity, start, goal, seed))
         return runs[0] if len(runs) == 1 else RoundRobin(runs, self.space, goal)
 
     def _mended(self, path: Array, resolution: float) -> Array | None:
@@ -162,7 +162,7 @@ class SegmentPlanner:
 
     def _result(self, path: Array, goal: Array, resolution: float, *, solved: bool) -> Segment:
         # An approach is worth no more than a look in the planner's own steps.
-        look = self._fine if solved else self.watch.counts(Validity(self.scene, self.space, resolution))
+        look = self._fine if solved else self.watch.counted(Validity(self.scene, self.space, resolution))
         dense = np.array([look.motion(a, b) for a, b in pairwise(path)], dtype=bool)
         certified = self._certified(path) & dense
         left = 0.0 if solved else self.space.distance(path[-1], goal)
@@ -183,7 +183,7 @@ def _searched(run: Run, start: Array, goal: Array, stop: Callable[[], bool]) -> 
     return (path if found else None), path
 
 
-def _run(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> CountedRun:
+def _begun(planner: str, space: PlanningSpace, validity: Validity, start: Array, goal: Array, seed: int) -> CountedRun:
     if planner == BATCH:
         return ExpandingRun(space, validity, start, goal, seed)
     # Imported here, because OMPL is an extra.

@@ -154,7 +154,7 @@ class EdgeVerdicts:
         if given is not None:
             raise ValueError(f"resolution is {given}; {message}")
         environment, log = self._scene.environment, DiagnosticLog()
-        counts = self._steps.counts(start, delta, self._steps.usual)
+        counts = self._steps.counts(start, delta, self._steps.default_resolution)
         if counts.sum(dtype=np.float64) <= _MOST_CHECKS:
             message = f"PositionRes {environment.resolution.position:g}: {message}"
             hint = "correct PositionRes, or give --resolution"

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.edges import even_rows
-from ..contact.queries import ContactQueries, joined, packed
+from ..contact.queries import ContactQueries, joined
 from ..contact.tasks import Question
 from ..contact.threads import ask, thread_count
 from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
@@ -135,7 +135,7 @@ class Scene:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Every tested pair of names."""
+        """The names of every tested pair: a link, and the obstacle or link that it may touch."""
         return tuple((p.link, p.other) for p in self._compiled.pairs.tested)
 
     @property
@@ -165,7 +165,11 @@ class Scene:
     # Where things are.
 
     def set(self, q: ArrayLike) -> None:
-        """Put the robots of `data` at q, at rest, and run `mj_forward`."""
+        """Put the robots of `data` at q, (dim,), at rest, and run `mj_forward`.
+
+        Raises:
+            ValueError: q is not one configuration.
+        """
         row = self.space.check_row(q)
         data = self.data
         data.qpos[:] = self.space.qpos(row)
@@ -173,15 +177,18 @@ class Scene:
         mujoco.mj_forward(self.model, data)
 
     def q(self) -> Array:
-        """Return the configuration that `data` holds, (dim,)."""
+        """Return the configuration that `data` holds, (dim,), in metres and radians."""
         return self.space.from_qpos(self.data.qpos)
 
     def link_poses(self, q: ArrayLike, *, threads: int | None = None) -> Array:
-        """Return the world poses of all robot bodies out of MuJoCo's kinematics, (..., nlinks, 4, 4).
+        """Return the world poses of all robot bodies out of MuJoCo's kinematics, (nlinks, 4, 4) or (n, nlinks, 4, 4).
 
         Args:
             q: Configurations, (dim,) or (n, dim).
             threads: As for `in_collision`.
+
+        Raises:
+            ValueError: q has a wrong shape or a value that is not finite, or threads is below 1.
         """
         columns, shape = (self.space.check(q),), (len(self._solver.links), 4, 4)
         return self._rows(ContactQueries.link_poses, columns, threads, None, False, kind=np.float64, shape=shape)
@@ -191,10 +198,13 @@ class Scene:
         return np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
 
     def loop_error(self, q: ArrayLike) -> float | Array:
-        """Return how far the worst closed loop is from closed, in metres; 0.0 without loops.
+        """Return how far the worst loop is from closed, in metres: a float, or (n,) floats; 0.0 without loops.
 
         The greatest distance, over the ball around a loop's last link, between where the chain puts a point and where
         the loop-closing connection would.
+
+        Raises:
+            ValueError: q, (dim,) or (n, dim), has a wrong shape or a value that is not finite.
         """
         rows = self.space.check(q)
         worst = np.zeros(len(np.atleast_2d(rows)))
@@ -239,8 +249,9 @@ class Scene:
             A bool, or (n,) bools.
 
         Raises:
-            ValueError: q has a wrong shape or a value that is not finite, or the engine is unknown or not installed.
-            TypeError: The executor is not an Executor.
+            ValueError: q has a wrong shape or a value that is not finite, the engine is unknown or not installed, or
+                threads is below 1.
+            TypeError: The executor is not an Executor, or threads is not a whole number.
             concurrent.futures.BrokenExecutor: A worker process died, and the executor does not replace it.
         """
         if engine is executor is threads is None and (one := self._at_once(q)) is not None:
@@ -273,7 +284,7 @@ class Scene:
         return self._verdicts(ContactQueries.validities, q, threads, executor, progress, engine)
 
     def valid_rows(self, rows: Array) -> Bools:
-        """Return `is_valid` of rows, (n, dim), that are known to be finite float64, in this thread.
+        """Return `is_valid`, (n,), of rows (n, dim) that are known to be finite float64, in this thread.
 
         Nothing is checked or shared out, which for a few rows takes longer than the verdicts: for planners' loops.
         """
@@ -296,7 +307,11 @@ class Scene:
         return self._solver.explain(self.space.check_row(q), _known(engine))
 
     def out_of_bounds(self, q: ArrayLike) -> tuple[Reason, ...]:
-        """Return the reasons of `explain` without the contacts, which take longest to find."""
+        """Return the reasons of `explain`, for q (dim,), without the contacts, which take longest to find.
+
+        Raises:
+            ValueError: q is not one configuration.
+        """
         return self._solver.out_of_bounds(self.space.check_row(q))
 
     @overload
@@ -332,7 +347,7 @@ class Scene:
     def contacts(self, q: ArrayLike, *, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
 
-        There are some just where `in_collision` says so. Pairs that cannot move are included. Places, normals and
+        There are some exactly where `in_collision` is True. Pairs that cannot move are included. Places, normals and
         depths come from MuJoCo and from triangles, whichever engine says that there are any.
 
         Raises:
@@ -376,9 +391,9 @@ class Scene:
         def store(where: slice, answers: PackedContacts) -> None:
             parts[where.start] = answers
 
-        question = Question(packed, (rows,), (_known(engine),), self._solver.row_bytes())
+        question = Question(ContactQueries.packed_contacts, (rows,), (_known(engine),), self._solver.row_bytes())
         ask(self._solver, question, store, threads, executor, progress)
-        return joined([parts[start] for start in sorted(parts)] or [packed(self._solver, rows)])
+        return joined([parts[start] for start in sorted(parts)] or [self._solver.packed_contacts(rows)])
 
     # Edges and paths.
 
@@ -422,8 +437,9 @@ class Scene:
             engine: Override the scene's engine.
 
         Raises:
-            ValueError: q0 and q1 differ in shape, the engine is unknown or not installed, or the resolution is not
-                positive, or too small for such edges.
+            ValueError: As for `in_collision`; or q0 and q1 differ in shape, or the resolution is not positive, or too
+                small for such edges.
+            TypeError: As for `in_collision`.
         """
         extras = self._solver.steps.resolution(resolution), _known(engine)
         return self._rows(ContactQueries.edges_collide, self._way(q0, q1), threads, executor, progress, extras)
@@ -445,7 +461,7 @@ class Scene:
         executor: Executor | None = None,
         progress: bool = False,
     ) -> bool | Bools:
-        """Return whether nothing touches anywhere on the straight way between two configurations, proved.
+        """Return whether it is proved that nothing touches anywhere on the straight way between two configurations.
 
         True is a proof: distances along the way are compared with how far bodies can move (bounded as for
         `edge_in_collision`), so nothing is passed over. False means that bodies touch, or come nearer to each other
@@ -487,9 +503,13 @@ class Scene:
     def first_invalid_steps(
         self, start: Array, delta: Array, counts: NDArray[np.int64], **work: Unpack[VerdictWork]
     ) -> NDArray[np.int64]:
-        """Return which of `counts` even steps of ways from (e, dim) by (e, dim) is not valid first, (e,), or -1.
+        """Return which step of each straight way is the first that is not valid, (e,), counted from 0; -1 for none.
 
-        **work is as for `in_collision`.
+        Args:
+            start: Where the ways begin, (e, dim), known to be finite.
+            delta: Where they lead from there, (e, dim), as `space.difference` gives it.
+            counts: How many even steps each has, both ends included, (e,).
+            **work: As for `in_collision`.
         """
         threads, executor, progress = work.get("threads"), work.get("executor"), work.get("progress", False)
         if executor is None:
@@ -501,12 +521,13 @@ class Scene:
         """Return the step in metres that a resolution means: itself, else the file's PositionRes, else 0.01 extent.
 
         Raises:
-            ValueError: The resolution is not positive.
+            TypeError: The resolution is not a number.
+            ValueError: It is not positive, or not finite.
         """
         return self._solver.steps.resolution(resolution)
 
     def edge_rows(self, q0: ArrayLike, q1: ArrayLike, resolution: float | None = None) -> Array:
-        """Return the configurations that `edge_in_collision` looks at on one edge, both ends included, (n, dim).
+        """Return the configurations, (n, dim), that `edge_in_collision` looks at from q0 to q1, (dim,), ends included.
 
         Raises:
             ValueError: q0 or q1 is not a configuration, or the resolution is not positive, or too small for the edge.
@@ -520,6 +541,9 @@ class Scene:
 
         Args:
             wait: False works in a thread of its own, and returns 0.0 at once.
+
+        Raises:
+            ValueError: There is no folder to keep what is compiled.
         """
         if not wait:
             threading.Thread(target=self._solver.warm_up, name="env2mjcf-warm-up", daemon=True).start()
@@ -581,11 +605,8 @@ class Scene:
         return answers if not one else answers[0] if shape else answers[0].item()
 
     def _at_once(self, q: ArrayLike) -> Array | None:
-        """Return a single good row as (1, dim); None for anything else, which takes the long way.
-
-        A verdict may take less than a microsecond: this check is what of it can be made quick.
-        """
-        # A sum is finite if its terms are; the few that are not although theirs are take the long way, too.
+        """Return a single good row as (1, dim), within a microsecond; None for all else, which takes the long way."""
+        # A finite sum has finite terms; finite terms whose sum overflows take the long way, too.
         if type(q) is np.ndarray and q.shape == self._one_row and q.dtype is _FLOAT and isfinite(sum(q.tolist())):
             return q[None]
         return None

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from ..contact.containment import BoundaryTest
 from ..contact.types import Contact, Reason, Verdict, deepest
 from ..kinematics.transforms import Array
+from ..options import whole
 from .scene import Scene
-
-SEED = 0
-"""Of the configurations that `count_touching` draws."""
 
 
 class Verdicts:
@@ -107,13 +105,12 @@ def count_touching(scene: Scene, samples: int) -> tuple[PairCount, ...]:
         A count for each pair, in the order of `scene.pairs`.
 
     Raises:
-        ValueError: samples is below 1.
+        TypeError: samples is not a whole number.
+        ValueError: It is below 1.
     """
-    if samples < 1:
-        raise ValueError(f"samples is {samples}; expected at least 1")
-    counts = dict.fromkeys(scene.pairs, 0)
+    samples, counts = whole("samples", samples, 1), dict.fromkeys(scene.pairs, 0)
     if counts:
-        for q in np.vstack([scene.space.home, scene.space.sample(samples - 1, SEED)]):
+        for q in np.vstack([scene.space.home, scene.space.sample(samples - 1, seed=0)]):
             for pair in {(c.link, c.other) for c in scene.contacts(q)}:
                 counts[pair] += 1
     constant = {(p.link, p.other) for p in scene.compiled.pairs.tested if p.constant}

@@ -145,7 +145,7 @@ def _refuse_special(path: Path) -> None:
 
 @contextmanager
 def _said(file: str | os.PathLike[str], code: str) -> Generator[None]:
-    """Say what the system has against a file that is written."""
+    """Make a ConversionError of an OSError about a file that is written."""
     try:
         yield
     except OSError as error:
@@ -186,7 +186,7 @@ def refuse_unwritable(out: PathArgument, code: str, inputs: Sequence[PathArgumen
 
 
 def _against_name(path: Path) -> str:
-    """Return what the system has against the name of a file, that it is too long, say."""
+    """Return why the system refuses the name of a file, which may be too long; empty where it does not."""
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -207,7 +207,7 @@ def refuse_foreign(
         out: The file to write.
         code: The code of the diagnostic.
         kind: What is written, as "a path file".
-        belongs: Says of the beginning of a file whether it is of that kind; nobody misses one of white space only.
+        belongs: Says of the beginning of a file whether it is of that kind; one of white space only is always replaced.
         size: Bytes that tell what it is; -1 for all.
         hint: What to do about it.
 

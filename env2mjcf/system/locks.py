@@ -66,11 +66,11 @@ def unlock(handle: int) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Generator[None]:
+def folder_lock(folder: Path) -> Generator[None]:
     """Keep other processes and threads from changing a folder, where the system can lock it.
 
     Raises:
-        FolderBusyError: Another one does not let anybody in.
+        FolderBusyError: Another one has kept it locked for too long.
         OSError: The folder cannot be opened.
     """
     if os.name == "nt":  # folders cannot be opened
@@ -128,7 +128,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_reopen)
 
 
-class lasting(Generic[T]):
+class lazy_property(Generic[T]):
     """A property that is worked out when it is first asked for; by two threads at once, twice.
 
     `functools.cached_property` of Python 3.11 has one lock for all instances of a class: a scene would wait for another
@@ -143,10 +143,10 @@ class lasting(Generic[T]):
         self._name = name
 
     @overload
-    def __get__(self, instance: None, owner: type) -> lasting[T]: ...
+    def __get__(self, instance: None, owner: type) -> lazy_property[T]: ...
     @overload
     def __get__(self, instance: object, owner: type) -> T: ...
-    def __get__(self, instance: object | None, owner: type) -> lasting[T] | T:
+    def __get__(self, instance: object | None, owner: type) -> lazy_property[T] | T:
         if instance is None:
             return self
         # What is found here hides this descriptor, so that it is asked once.
@@ -159,7 +159,7 @@ _ended = threading.Event()
 
 
 @contextmanager
-def working() -> Generator[None]:
+def delayed_exit() -> Generator[None]:
     """Keep the interpreter from ending meanwhile; it stops a daemon thread that begins when it is already ending."""
     this = threading.current_thread()
     _at_work.add(this)

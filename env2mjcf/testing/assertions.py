@@ -77,7 +77,8 @@ def assert_valid_path(
 
     Raises:
         AssertionError: The path is not valid; the message says where along it, and why.
-        ValueError: The path has a wrong shape, holds no row, or a value that is not finite.
+        ValueError: The path has a wrong shape, holds no row, or a value that is not finite; or the resolution is not
+            positive, or too small for such edges.
     """
     __tracebackhide__ = True
     rows = _rows(scene, path)

@@ -33,7 +33,7 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> env2mjcf.Scene:
 
 
 def content(folder: Path) -> dict[str, tuple[int, object]]:
-    """Return what a folder holds, without opening what is no file."""
+    """Return what a folder holds, without opening what is not a file."""
     found: dict[str, tuple[int, object]] = {}
     for path in folder.rglob("*"):
         mode, said = path.lstat().st_mode, None
@@ -258,7 +258,7 @@ def test_the_longest_name_will_do(scene) -> None:
 @pytest.mark.parametrize("end", [folders.kill_at, folders.fail_at])
 @pytest.mark.parametrize("row", [None, 0, 250])
 def test_at_whatever_moment_it_ends_the_next_run_is_right(scene, tmp_path, monkeypatch, end, row) -> None:
-    """It is killed, or the disk is full, at each call that looks at or changes a file; or a row is no good besides."""
+    """It is killed, or the disk is full, at each call that looks at or changes a file; a row may be bad as well."""
     monkeypatch.setattr(running_module, "_COMMIT_SECONDS", -1.0)
     out = tmp_path / "out"
     out.mkdir()

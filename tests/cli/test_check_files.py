@@ -148,7 +148,7 @@ def test_many_are_listed_on_request(check, tmp_path: Path) -> None:
 
 
 def test_edges_go_the_way_that_their_local_planner_went(check, tmp_path: Path) -> None:
-    """Turning half way, the second cube keeps 1.5 m away from the first; turning all the way it comes by a pin."""
+    """Turning half way, the second cube keeps 1.5 m away from the first; turning all the way it hits a pin."""
     pin = "MultiBody Passive\n1\nFixedBody 0 pin.g 4.15 0.98 0 0 0 0\nConnection\n0\n"
     text = SERIAL.replace("1\nMultiBody Active", "2\nMultiBody Active", 1) + pin
     write_scene(tmp_path, text, pin=box_mesh(0.05, 0.05, 0.05))

@@ -108,7 +108,7 @@ def test_other_signals_end_it_as_tidily(number: signal.Signals, tmp_path: Path) 
     )  # fmt: skip
     try:
         wait_for(lambda: list((tmp_path / "temporary").glob("env2mjcf-*/scene.mjb")), child)
-        for _ in range(3):  # a terminal, its shell, and whoever else
+        for _ in range(3):  # a terminal, its shell, and others
             child.send_signal(number)
         said = child.communicate(timeout=60)[1]
     finally:

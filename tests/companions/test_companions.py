@@ -307,7 +307,7 @@ SLIPS = (
 
 @pytest.mark.parametrize("kind", ["path", "poses", "map", "query"])
 def test_no_slip_of_the_pen_is_more_than_a_refusal(tmp_path: Path, kind: str) -> None:
-    """One word after the other is replaced by whatever may stand there by mistake, and every other line is doubled."""
+    """One word after the other is replaced by what may stand there by mistake, and every other line is doubled."""
     scene = load(tmp_path, SCENES["A"] if kind == "poses" else SCENES["D"])
     q = scene.space.sample(4, seed=0)
     file = tmp_path / "x"

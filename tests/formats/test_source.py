@@ -1,4 +1,4 @@
-"""Opening text files: encodings, line ends, places, and everything that is no text file."""
+"""Opening text files: encodings, line ends, places, and everything that is not a text file."""
 
 from __future__ import annotations
 

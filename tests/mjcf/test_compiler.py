@@ -81,7 +81,7 @@ def test_keyframes_are_home_start_and_goal() -> None:
     np.testing.assert_allclose(scene.space.home[6:], math.radians(30))
 
 
-def test_bases_become_the_joints_of_the_contract() -> None:
+def test_bases_and_connections_become_joints_of_their_kind() -> None:
     kinds = {
         "seed": ["free", "hinge", "hinge", "hinge"],
         "gantry": ["slide", "slide", "slide", "hinge"],

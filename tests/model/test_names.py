@@ -64,7 +64,7 @@ def _stem(request: pytest.FixtureRequest) -> str:
     return STEMS[request.param]
 
 
-# No text names a file whose name is none.
+# A lone surrogate cannot stand in a text, so no scene can name such a mesh.
 @pytest.fixture(params=[k for k in STEMS if k != "surrogate"], name="mesh")
 def _mesh(request: pytest.FixtureRequest) -> str:
     return STEMS[request.param]
@@ -222,7 +222,7 @@ def test_words_of_the_command_line_are_no_commands(capsys: pytest.CaptureFixture
         out, err = capsys.readouterr()
         assert_harmless(out, err)
         assert "\\x" in err
-    # And a word that is no option may hold what it likes.
+    # And a word that is not an option may hold what it likes.
     assert main(["info", "\x1b[2J.env"]) == 3
     assert "there is no file \\x1b[2J.env" in capsys.readouterr().err
 
@@ -438,5 +438,5 @@ def test_a_mesh_opens_no_other_file(kind: str, tmp_path: Path) -> None:
         try:
             env2mjcf.load(path, engine="mujoco", cache=False)
         except GeometryError:
-            assert kind == "glb"  # without its vertices it is no mesh
+            assert kind == "glb"  # without its vertices it is not a mesh
     assert opened == []

@@ -470,7 +470,7 @@ def test_other_verbs_do_without_ompl_and_a_run_ends_in_silence(room: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("planner", ["RRTConnect", "PRM"])
 def test_the_collector_may_run_at_any_time(planner: str, room: Path):
-    """Freed memory is filled, so that whoever looks at it crashes."""
+    """Freed memory is filled, so that code that looks at it crashes."""
     code = (
         "import gc, env2mjcf\nfrom env2mjcf.planning import plan\n"
         f"scene = env2mjcf.load({str(room / 'open.env')!r}, query={str(room / 'cross.query')!r}, engine='mujoco')\n"

@@ -192,7 +192,7 @@ def test_edges_are_checked_between_their_ends(cubes: env2mjcf.Scene) -> None:
     assert not cubes.edge_in_collision(above, below, resolution=100.0)
     with pytest.raises(ValueError, match="equal shapes"):
         cubes.edge_in_collision(above, np.stack([below]))
-    with pytest.raises(ValueError, match="positive length"):
+    with pytest.raises(ValueError, match="positive number"):
         cubes.edge_in_collision(above, below, resolution=0)
 
 

@@ -115,7 +115,7 @@ def slope(readings: list[Reading], name: str, per: str = "operations") -> float:
 
 
 def steady_slope(readings: list[Reading], name: str) -> float:
-    """Return how much of something each operation adds in either half: what comes once, and stays, is no leak."""
+    """Return how much of something each operation adds in either half: what comes once, and stays, is not a leak."""
     middle = len(readings) // 2
     return min(slope(readings[: middle + 1], name), slope(readings[middle:], name))
 

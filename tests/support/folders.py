@@ -38,7 +38,7 @@ def two_scenes(folder: Path) -> tuple[Path, Path]:
 
 
 def add_foreign(folder: Path) -> None:
-    """Put files into an output folder that are no conversion's."""
+    """Put files into an output folder that are not of a conversion."""
     for name, content in FOREIGN.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

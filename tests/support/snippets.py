@@ -1,6 +1,6 @@
-"""Runs the examples of a page of the documentation, as a reader would, in a copy: `tests/support/snippets.py PAGE`.
+"""Runs the examples of a page of the documentation, as a reader would: `tests/support/snippets.py PAGE`.
 
-From top to bottom, in the current folder:
+From top to bottom, in the current folder, where what they write stays:
 
 * ```` ```python ````: run; all blocks of a page share one module. ```` ```text ```` right behind it is what it prints.
 * ```` ```console ````: a line that begins with `$ ` is run by a shell, with the next if it ends with `\\`; below it
@@ -136,6 +136,7 @@ def run_command(line: int, words: str) -> str:
         "COLUMNS": "100",
         "NO_COLOR": "1",
         "TERM": "dumb",
+        "PYTEST_ADDOPTS": "",
     }
     done = subprocess.run(
         ["bash", "-c", words], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False

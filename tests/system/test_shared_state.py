@@ -199,7 +199,7 @@ def test_the_process_is_as_it_was_after_planning_and_pictures() -> None:
 
 
 def test_numpys_own_settings_do_not_change_answers(tmp_path: Path) -> None:
-    """Who has numpy raise on every odd number gets the same answers."""
+    """A caller that lets numpy raise on invalid results gets the same answers."""
     scene = env2mjcf.load(ALPHA)
     q = scene.space.sample(10, seed=0)
     expected = scene.clearance(q).tolist(), scene.is_valid(q, engine="mujoco").tolist()

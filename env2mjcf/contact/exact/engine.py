@@ -143,7 +143,7 @@ class _Loading:
     def before_fork(self) -> None:
         """Wait until nothing is imported or compiled, and keep it so."""
         self.lock.acquire()
-        # Not imported by anybody: then nothing compiles.
+        # Where it is not imported, nothing compiles.
         module = sys.modules.get("numba.core.compiler_lock")
         self._compiling = getattr(module, "global_compiler_lock", None)
         if self._compiling is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from ...geometry.topology import Floats, Ints
 from ...kinematics.forward import RobotKinematics
 from ...kinematics.transforms import dh_matrix, pose_matrix
-from ...kinematics.tree import DofKind
+from ...kinematics.tree import POSITIONS, ROTATIONS, DofKind
 from ...model.environment import BaseKind, DHForm
 
 WORLD = -1
@@ -26,9 +26,6 @@ class Motion(IntEnum):
     SLIDE_Z = 3
     BASE = 4
     """Rz Ry Rx and a translation, in the world."""
-
-
-_BASE = (DofKind.X, DofKind.Y, DofKind.Z, DofKind.RX, DofKind.RY, DofKind.RZ)
 
 
 class Motions:
@@ -86,7 +83,7 @@ class Motions:
     ) -> tuple[int, Floats]:
         if robot.tree.bases[body] is BaseKind.FIXED:
             return WORLD, pose_matrix(robot.multibody.bodies[body].pose)
-        own = tuple(columns.get((None, body, kind), WORLD) for kind in _BASE)
+        own = tuple(columns.get((None, body, kind), WORLD) for kind in POSITIONS + ROTATIONS)
         return self._add(WORLD, np.eye(4), Motion.BASE, own), np.eye(4)
 
 

@@ -107,7 +107,7 @@ class TestVerdicts:
 
     @pytest.mark.parametrize("collision", ["auto", "surface", "hull"])
     def test_of_a_small_body_in_a_large_one_and_round_it(self, tmp_path: Path, collision: str) -> None:
-        """The box around may be the link as well as the obstacle, and either may be no box."""
+        """The box around may be the link as well as the obstacle, and either may be another shape."""
         octahedron = "1 6 8 24\n1 8\n" + "".join(f"{x} {y} {z}\n" for x, y, z in 0.3 * np.array(_OCTAHEDRON)) + _FACES
         shell = free_cube("inner.g 0 0 0 0 0 0")
         path = write_scene(tmp_path, shell, cube=box_mesh(1, 1, 1), inner=octahedron)

@@ -20,7 +20,7 @@ NAMES = [f"cube.{k}" for k in ("x", "y", "z", "rx", "ry", "rz")] + [f"link{i}.th
 
 
 def coloured(picture: np.ndarray) -> int:
-    """Return how many pixels are no background, which is almost grey."""
+    """Return how many pixels are not background, which is almost grey."""
     return int((np.ptp(picture.astype(int), axis=2) > 24).sum())
 
 
