@@ -15,7 +15,7 @@ def run() -> int:
     except KeyboardInterrupt:
         return program.interrupted_status()
     finally:
-        # All is done: a signal while the interpreter tidies up shall not print a traceback.
+        # All is done: a signal while the interpreter tidies up must not print a traceback.
         program.end_at_once()
 
 

@@ -67,7 +67,7 @@ def convert(path: PathArgument, out: PathArgument, **options: Unpack[OptionKeywo
         folder, name = target.parent, target.stem
     else:
         folder, name = target, scene.compiled.document.name
-    with _clear_write_errors(folder, log):
+    with _explaining_write_errors(folder, log):
         # Such as the XML environment that is being converted; any comments may stand above what tells what it is.
         hint = "choose another output folder, or name the file: out/scene.xml"
         refuse_foreign(folder / f"{name}.xml", "MJC423", "MJCF", is_mjcf, -1, hint)
@@ -88,7 +88,7 @@ def _write(scene: Scene, folder: Path, name: str, log: DiagnosticLog) -> tuple[P
 
 
 @contextmanager
-def _clear_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
+def _explaining_write_errors(folder: Path, log: DiagnosticLog) -> Generator[None]:
     try:
         yield
     except (FileExistsError, NotADirectoryError):

@@ -1,4 +1,4 @@
-"""The catalogue of diagnostic codes: what each one means.
+"""The catalogue of diagnostic codes, what each one means; and the log that findings go to.
 
 Codes are stable. `ENV` concerns text files, `GEO` meshes, `KIN` bodies and connections, `MJC` what is written for
 MuJoCo, `CFG` configurations and queries.
@@ -74,7 +74,7 @@ CATALOGUE: dict[str, str] = {
     "ENV166": "The planner of a dialect knows no Prismatic joints; they are written all the same.",
     "ENV167": "Dialect A cannot carry a body like this.",
     "ENV168": "A dialect has no pose for a free base; it is at home at the origin.",
-    "ENV169": "Dialects A to C move the mean of a mesh's vertices to the origin, and a mesh is not to be moved so.",
+    "ENV169": "Dialects A to C move the mean of a mesh's vertices to the origin, and a mesh must not be moved.",
     "ENV170": "A dialect has no masses, textures, transparent colours, or labels of surfaces; they are lost.",
     "ENV171": "Meshes lie outside the folder that an environment is written into.",
     "ENV172": "A dialect has no adjacencies; they are lost.",
@@ -242,8 +242,8 @@ CATALOGUE: dict[str, str] = {
     "CFG533": "An edge of a roadmap joins nodes of different robots; it is not used.",
     "CFG534": "Edges of a roadmap were made by a local planner that is not known; they are checked as straight ways.",
     "CFG535": "A path or roadmap of dialect A's time is read in turns for a scene of a later dialect.",
-    "CFG536": "The file's PositionRes is too small to plan with, or for checks of edges to end.",
-    "CFG537": "An edge is so long that it would take more checks than end.",
+    "CFG536": "The file's PositionRes is so small that planning, or checking an edge, would never end.",
+    "CFG537": "An edge is so long that checking it would never end.",
     "CFG540": "There is no task to plan.",
     "CFG541": "A task to plan has no goal.",
     "CFG542": "A planned path cannot be written.",

@@ -129,6 +129,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"did you mean {by_folded[near[0]]!r}?" if near else ""
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number of things, in the plural where there is not one."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 # Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.
 _TRICKY = ("Cc", "Cf", "Cs", "Zl", "Zp")
 

@@ -105,7 +105,7 @@ def bounded(limits: Limits, log: DiagnosticLog, subject: str, span: Span | None)
         yield
     except TooMuchWorkError:
         message = (
-            f"{subject} takes too long to repair and to cut into convex pieces: more than {limits.mesh_work} of its "
+            f"{subject} takes too long to repair and cut into convex pieces: more than {limits.mesh_work} of its "
             "parts would have to be compared"
         )
         hint = f"remove parts that overlap, choose collision='hull' (--collision hull), or {Limits.hint('mesh_work')}"

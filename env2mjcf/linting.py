@@ -19,6 +19,7 @@ from .formats import xml_scene
 from .formats.detect import is_robot_file, is_xml
 from .formats.env import read_robot
 from .formats.lexer import Scanner
+from .formats.problem import PROBLEM_TAGS
 from .formats.reading import read_scene
 from .formats.source import read_source
 from .formats.xml import parse_xml
@@ -33,7 +34,7 @@ from .system.files import open_regular
 
 # What is skipped is never tried in another way: comments could end at each of the marks behind their own.
 _ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
-_SCENE_TAGS = ("environment", "motionplanning", "motion_planning", "mpproblem", "problem")
+_SCENE_TAGS = ("environment", *PROBLEM_TAGS)
 _SNIFFED_BYTES = 1 << 16
 
 
@@ -180,12 +181,11 @@ def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
     # Imported here because MuJoCo is slow to import, and robots and meshes do not need it.
     from .simulation.loading import prepare
 
+    log = DiagnosticLog()
     try:
         if is_robot_file(read_source(path, DiagnosticLog(), options.limits, regular=True)):
-            log = DiagnosticLog()
             _lint_robot(path, options, log)
             return tuple(log)
-        log = DiagnosticLog()
         environment = read_scene(path, options, log)
     except Env2MjcfError as error:
         return error.diagnostics

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
@@ -11,7 +11,7 @@ from os import PathLike
 from typing import Any, Literal, TypedDict, get_args
 
 from .errors import did_you_mean
-from .limits import Limits
+from .limits import LARGEST, Limits
 
 Semantics = Literal["planner", "page"]
 Collision = Literal["auto", "hull", "surface", "solid", "coacd"]
@@ -37,7 +37,7 @@ class Options:
         dialect: Read the file as this dialect instead of telling it from the text.
         strict: Turn warnings into errors.
         mesh_dirs: More folders in which meshes are looked for.
-        allow_outside: May meshes outside the scene's folder and `mesh_dirs` be read.
+        allow_outside: Read files outside the scene's folder and `mesh_dirs`, too, that a scene or problem XML names.
         collision: How meshes become convex collision shapes.
         primitives: Write exact boxes as box geoms.
         self_collision: Test links of one robot against each other; unless given, what a problem XML says, else True.
@@ -212,8 +212,8 @@ def _pair(value: Any) -> tuple[str, str]:
 
 
 def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
-    values = tuple(value)
-    if len(values) != 3 or not all(isinstance(g, Real) and math.isfinite(g) for g in values):
+    values: tuple[Any, ...] = tuple(value)
+    if len(values) != 3 or not all(isinstance(g, Real) and abs(g) <= LARGEST for g in values):
         raise ValueError(f"gravity must be three finite numbers, got {values!r}")
     return tuple(float(g) for g in values)
 
@@ -234,17 +234,16 @@ def whole(name: str, value: object, least: int, most: int | None = None) -> int:
     return number
 
 
-def positive(name: str, value: object, most: float | None = None) -> float:
+def positive(name: str, value: object) -> float:
     """Return an argument that is a finite number above zero.
 
     Raises:
         TypeError: It is not a number; the message names it.
-        ValueError: It is not positive, not finite, or above `most`.
+        ValueError: It is not positive, or not finite.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} is {value!r}; expected a number")
-    number = float(value)
-    if not 0 < number < math.inf or (most is not None and number > most):
-        limit = "" if most is None else f" up to {most:g}"
-        raise ValueError(f"{name} is {value}; expected a positive number{limit}")
-    return number
+    number: Any = value  # not a float yet: an integer may be larger than any
+    if not 0 < number <= sys.float_info.max:
+        raise ValueError(f"{name} is {value}; expected a positive number")
+    return float(number)

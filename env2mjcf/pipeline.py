@@ -50,7 +50,7 @@ class Compiled:
 def compile_scene(source: PathArgument | Environment, options: Options, log: DiagnosticLog) -> Compiled:
     """Take a file, or what was read from it with the same log, through the whole pipeline."""
     environment = source if isinstance(source, Environment) else read_scene(source, options, log)
-    # What counts alone tell is told before the work on the geometry.
+    # What counting is enough for is refused before the work on the geometry.
     _check_pairs(environment, options, log)
     refuse_long_chains(environment, log)
     assembly = assemble(scaled(environment, options.scale), options, log)

@@ -30,6 +30,7 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"gravity": 3}, TypeError, "gravity=3; expected a sequence"),
     ({"gravity": (0, 0)}, ValueError, "gravity must be three finite numbers"),
     ({"gravity": "123"}, ValueError, "gravity must be three finite numbers"),
+    ({"gravity": (0, 0, 10**400)}, ValueError, "gravity must be three finite numbers"),
     ({"gravity": (0, 0, float("inf"))}, ValueError, "gravity must be three finite numbers"),
     ({"adjacent_links": -1}, ValueError, "adjacent_links is -1; expected at least 0"),
     ({"adjacent_links": 1.0}, TypeError, "adjacent_links is 1.0; expected a whole number"),

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ..companions.arrays import MappedRows, open_rows
 from ..contact.threads import thread_count
-from ..mjcf.compiler import package_version
 from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..system.files import refuse_foreign, refuse_unwritable
+from ..system.imports import installed_version
 from .journal import Partial, Progress, unfinished_files
 
 What = Literal["collision", "valid", "clearance"]
@@ -226,7 +226,7 @@ def identity(scene: Scene, what: str, file_units: bool) -> str:
     digest = hashlib.sha256()
     chosen = (options.collision, options.engine, options.semantics, options.scale)
     boundary = repr(compiled.assembly.environment.boundary)
-    facts = [package_version(), what, file_units, *chosen, scene.pairs, space.names, boundary]
+    facts = [installed_version(), what, file_units, *chosen, scene.pairs, space.names, boundary]
     digest.update(json.dumps(facts).encode())
     for array in (space.lower, space.upper, space.periodic, space.home, space.decode(np.ones(space.dim))):
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -25,7 +25,7 @@ class Output:
 
     Attributes:
         json: Print the result as JSON.
-        verbose: Show diagnostics that are only worth knowing, too.
+        verbose: Show notes, too, not just warnings and errors.
         debug: Show a traceback when something fails.
     """
 

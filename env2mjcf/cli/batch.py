@@ -13,11 +13,12 @@ import tyro
 from rich.text import Text
 from tyro.conf import Positional
 
+from ..errors import counted
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .meter import Meter
 from .program import DONE
-from .terminal import counted, loaded, one_line, print_diagnostics, print_json, print_parts, remark
+from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, remark
 
 if TYPE_CHECKING:
     from ..batch import BatchResult

@@ -18,7 +18,7 @@ class Cache:
     """Say what the geometry cache holds, or empty it; or compile the exact engine, once.
 
     The cache keeps convex pieces of meshes between runs. Its folder is that of the platform, or the one that
-    ENV2MJCF_CACHE_DIR names; convert, info, check and lint leave it alone with --no-cache.
+    ENV2MJCF_CACHE_DIR names. With --no-cache, a verb that loads scenes leaves it alone.
 
     The exact engine is compiled by numba at its first use, and kept beside the installed package (else where
     NUMBA_CACHE_DIR says); "warm" does that now instead of at the first query.

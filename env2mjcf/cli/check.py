@@ -17,7 +17,7 @@ from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, one_line
+from ..errors import ConversionError, counted, one_line
 from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags
@@ -125,11 +125,12 @@ class Check:
 
     def _rows(self, scene: Scene, log: DiagnosticLog) -> Configurations:
         from ..companions.configurations import of_file, of_numbers, of_scene
+        from ..companions.records import is_number
 
         words = self.configurations if self.options.query is None else (str(self.options.query),)
         if not words:
             return of_scene(scene)
-        if len(words) == 1 and not _is_number(words[0]):
+        if len(words) == 1 and not is_number(words[0]):
             return of_file(scene, words[0], self.radians, self.options.limits, log)
         return of_numbers(scene, words, self.radians)
 
@@ -170,14 +171,6 @@ class Check:
             yield Text(f"... and {left} more that are invalid (--all lists every {what})", "dim")
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
 def _node_lines(label: str, verdict: Verdict) -> Iterator[Text]:
     yield _headed(label, verdict.summary)
     for reason in verdict.reasons:
@@ -211,7 +204,7 @@ def _node_summary(nodes: Verdicts, what: str) -> Text:
         "out of limits": (~nodes.in_limits).sum(),
         "outside the boundary": (~nodes.inside).sum(),
     }
-    return Text(f"{_counted(len(nodes.valid), what)}: {_counts(f'{nodes.valid.sum()} valid', wrong)}", "bold")
+    return Text(f"{counted(len(nodes.valid), what)}: {_counts(f'{nodes.valid.sum()} valid', wrong)}", "bold")
 
 
 def _edge_summary(edges: EdgeVerdicts) -> Text:
@@ -221,7 +214,7 @@ def _edge_summary(edges: EdgeVerdicts) -> Text:
         "not checked": (~edges.checked).sum(),
     }
     counts = _counts(f"{edges.valid.sum()} valid{'' if edges.proved is None else ' and proved free'}", wrong)
-    return Text(f"{_counted(len(edges.valid), 'edge')}, checked every {edges.resolution:.4g} m: {counts}", "bold")
+    return Text(f"{counted(len(edges.valid), 'edge')}, checked every {edges.resolution:.4g} m: {counts}", "bold")
 
 
 def _counts(valid: str, wrong: dict[str, int]) -> str:
@@ -278,10 +271,6 @@ def _edge_json(verdict: EdgeVerdict) -> dict[str, Any]:
 
 def _headed(label: str, wrong: str) -> Text:
     return Text.assemble(f"{one_line(label)}: ", (wrong, "bold red") if wrong else ("valid", "bold green"))
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _bar(count: int, unit: str) -> tqdm[int]:

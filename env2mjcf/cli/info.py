@@ -71,7 +71,7 @@ class Info:
             print_json({**facts, "diagnostics": loaded.diagnostics})
         else:
             print_parts(self._parts(summary, scene))
-        # Findings that are only worth knowing are part of what was asked for.
+        # Notes are part of what was asked for.
         print_diagnostics(loaded.diagnostics, verbose=not self.output.json or self.output.verbose)
         return BAD_INPUT if error else DONE
 

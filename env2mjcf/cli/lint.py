@@ -10,11 +10,11 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from ..errors import Diagnostic, Severity
+from ..errors import Diagnostic, Severity, counted
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE, FINDING
-from .terminal import console_on, counted, one_line, print_diagnostic, print_json, printable, remark
+from .terminal import console_on, one_line, print_diagnostic, print_json, printable, remark
 
 _GITHUB_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from ..errors import Env2MjcfError, did_you_mean
+from ..system.imports import installed_version
 from . import program
 from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
 from .terminal import print_diagnostics, print_json, printable, remark, tame_libraries
@@ -94,7 +95,7 @@ def _dispatch(words: list[str]) -> int:
         print(_HELP, end="")
         return DONE
     if name == "--version":
-        print(_version())
+        print(installed_version() or "a checkout that is not installed")
         return DONE
     if name not in VERBS:
         guess = did_you_mean(name, VERBS)
@@ -118,15 +119,6 @@ def _dispatch(words: list[str]) -> int:
     import_module("trimesh")
     program.end_tidily()
     return _run(name, verb)
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("env2mjcf")
-    except PackageNotFoundError:
-        return "a checkout that is not installed"
 
 
 def _run(name: str, verb: Verb) -> int:

@@ -36,7 +36,7 @@ class Plan:
 
     Without a solution in time the exit status is 1, and the best approach, from the start to what came nearest to the
     goal, is written beside the output: out.approach.path for out.path. A start or goal that is not valid is a finding,
-    too: it is said who touches, and nothing is written.
+    too: the report says why, and nothing is written.
 
     Planners: auto, RRTConnect, RRT, RRTstar, KPIECE, BKPIECE, LBKPIECE, PRM, PRMstar, FMT, BFMT (all of OMPL) and
     BatchEST (ours: trees that grow by small changes, for narrow places). auto lets RRTConnect and BatchEST take turns.
@@ -49,10 +49,10 @@ class Plan:
 
     Attributes:
         scene: An env file, an XML environment or a problem XML.
-        out: The path file to write; none is written without.
+        out: The path file to write; without it none is written.
         planner: Which planner; see above.
         time: Seconds after which to give up.
-        seed: Of the random numbers; equal seeds give equal paths, unless time runs out.
+        seed: Seed of the random numbers; equal seeds give equal paths, unless time runs out.
         resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner;
             otherwise the file's PositionRes, else 0.01 of the extent.
         corners: Write just the corners of the path.
@@ -112,7 +112,7 @@ class Plan:
 
         Raises:
             FormatError: Nothing in the scene moves, there is no task, or it has no goal.
-            ValueError: There are not so many.
+            ValueError: There are fewer tasks than --task asks for.
         """
         from ..companions.configurations import refuse_without_freedom
 

@@ -46,7 +46,7 @@ class Play:
         path: What the robots follow.
         out: The .mp4 or .gif file to write.
         radians: Numbers of a .csv or .npy file are radians and metres.
-        seconds: How long the film is, if not as the path is long (3 to 10 seconds).
+        seconds: Length of the film; by default 3 to 10 seconds, by the length of the path.
         fps: Pictures per second.
         camera: overview, front, back, left, right, top, or azimuth,elevation of the line of sight in degrees.
         ghosts: Draw the way as a line, and robots nearly transparent along it.

@@ -144,7 +144,7 @@ def _take_over_streams() -> None:
 
 
 def _over(raw: io.FileIO, before: TextIO | None) -> TextIO:
-    """Return a stream that encodes as the one before did, and keeps no line back that it did not."""
+    """Return a stream with the encoding and the buffering of the one before."""
     if not isinstance(before, io.TextIOWrapper):
         return io.TextIOWrapper(io.BufferedWriter(raw), "utf-8")
     at_once = before.line_buffering or before.write_through

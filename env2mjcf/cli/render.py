@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 from rich.text import Text
@@ -14,9 +14,6 @@ from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
 from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, working
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +34,7 @@ class Render:
         scene: An env file, an XML environment or a problem XML.
         out: The PNG file to write.
         config: Numbers of one configuration, of all robots, or of one behind its index.
-        radians: They are radians and metres.
+        radians: Numbers are radians and metres.
         camera: overview, front, back, left, right, top, or azimuth,elevation of the line of sight in degrees.
         contacts: Tint what touches, and show where with arrows along the normals.
         trail: A path file: a line, and robots nearly transparent along it.

@@ -69,11 +69,6 @@ def remark(message: str) -> None:
     print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
 
 
-def counted(count: int, what: str) -> str:
-    """Return a number of things, in the plural where there is not one."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
-
-
 def print_parts(parts: Iterable[RenderableType]) -> None:
     """Print results: in colour and as wide as the terminal, or plain, never folded and without trailing blanks."""
     on_terminal = sys.stdout.isatty()
@@ -114,7 +109,7 @@ def loaded(path: str, options: Options) -> tuple[Scene, DiagnosticLog]:
 
 
 def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
-    """Print diagnostics to stderr; those that are only worth knowing on request."""
+    """Print diagnostics to stderr; notes only on request."""
     sys.stdout.flush()  # so that results stand before what is said about them
     console = console_on(sys.stderr, soft_wrap=True)
     for diagnostic in diagnostics:

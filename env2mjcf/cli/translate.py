@@ -11,11 +11,12 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
+from ..errors import counted
 from ..limits import LARGEST, Limits
 from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
 from .program import DONE
-from .terminal import counted, one_line, print_diagnostics, print_json, print_parts
+from .terminal import one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..model.environment import Boundary, Environment
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
 class Translate:
     """Write a scene in another dialect of the format.
 
-    Links, limits, tested pairs and boundary stay what they are; what the dialect cannot express is said, and what would
-    move links is refused. In dialect E each robot gets a file of its own beside the env file: new.env and new.robot.
-    Configurations of --query are turned into the dialect's numbers: new.query. Meshes stay where they are. An older
-    new.env is replaced, with its new.robot and new.query; nothing else is.
+    Links, limits, tested pairs and boundary stay what they are; what the dialect cannot express is reported, and what
+    would move links is refused. In dialect E each robot gets a file of its own beside the env file: new.env and
+    new.robot. Configurations of --query are turned into the dialect's numbers: new.query. Meshes stay where they are.
+    An older new.env is replaced, with its new.robot and new.query; nothing else is.
 
     Examples:
       env2mjcf translate serial.env -o new.env --dialect D --box -10 10 -10 10 -10 10
@@ -46,7 +47,7 @@ class Translate:
         semantics: Whose reading of a dialect A connection: the planner's, or the web page's.
         read_as: Read the scene as this dialect instead of telling it from the text.
         mesh_dirs: More folders in which meshes are looked for.
-        allow_outside: May a problem, or its scene, name files outside their folder.
+        allow_outside: Let a problem, or its scene, name files outside their folder.
         box: A boundary for a scene that has none, in file units; dialects C to E must have one.
         strict: Refuse whatever would be lost.
         limits: Bounds on hostile input.
@@ -98,7 +99,7 @@ class Translate:
         if not all(a < b for a, b in zip(lower, upper, strict=True)):
             raise ValueError("--box is empty; expected the lower and the upper end of x, y and z")
         if max(map(abs, self.box)) > LARGEST:
-            raise ValueError(f"--box is larger than {LARGEST:g}, and nothing that is could be read")
+            raise ValueError(f"--box is larger than {LARGEST:g}, so that nothing could read the file")
         return Boundary(BoundaryShape.BOX, lower, upper)
 
     def _options(self) -> dict[str, Any]:

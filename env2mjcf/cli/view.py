@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 import threading
@@ -89,9 +88,9 @@ class View:
 
         port = server.free_port(self.port)
         try:
-            with server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as server:
-                viewer = Viewer(server, scene, path)
-                self._announce(server.get_port(), log)
+            with server.serving(port, f"env2mjcf: {one_line(scene.environment.name)}") as page:
+                viewer = Viewer(page, scene, path)
+                self._announce(page.get_port(), log)
                 try:
                     threading.Event().wait()
                 finally:
@@ -101,6 +100,8 @@ class View:
         return DONE if program.interrupted in (0, signal.SIGINT) else program.interrupted_status()
 
     def _announce(self, port: int, log: DiagnosticLog) -> None:
+        from ..view.native import has_display
+
         url = f"http://127.0.0.1:{port}"
         if self.output.json:
             print_json({"url": url, "port": port, "diagnostics": tuple(log)})
@@ -108,10 +109,6 @@ class View:
             print(url)
         sys.stdout.flush()
         print("the page is served to this machine alone; Ctrl-C ends", file=sys.stderr)
-        if self.browser and _has_screen():
+        # Without a display, a browser of text might take over the terminal.
+        if self.browser and has_display():
             webbrowser.open(url)
-
-
-def _has_screen() -> bool:
-    # Without one, a browser of text might take over the terminal.
-    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

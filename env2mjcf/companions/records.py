@@ -149,7 +149,7 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
     )
     for n, (line, start, words) in enumerate(row for row in rows if row[2]):
         numbers = [coordinate(w.group()) for w in words]
-        if n == 0 and not any(_looks_like_a_number(w.group()) for w in words):
+        if n == 0 and not any(is_number(w.group()) for w in words):
             continue  # names of columns
         wrong = next((w for w, x in zip(words, numbers, strict=True) if x is None), None)
         if wrong is not None:
@@ -168,7 +168,8 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
     return joined(scene, found)
 
 
-def _looks_like_a_number(word: str) -> bool:
+def is_number(word: str) -> bool:
+    """Return whether Python reads a word as a number, such as `1e-3` or `nan`."""
     try:
         float(word)
     except ValueError:

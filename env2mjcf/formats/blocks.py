@@ -59,7 +59,7 @@ def read_coordinate(scan: Scanner, what: str) -> float:
     value = scan.number(what)
     if abs(value) > LARGEST:
         message = f"{what} is {value:g}; at most {LARGEST:g} can be computed with"
-        hint = "is the file damaged? What has no end is wide enough with 1e6"
+        hint = "is the file damaged? For a range without end, 1e6 is wide enough"
         scan.fail("ENV183", message, hint=hint, span=scan.span(start))
     return value
 

@@ -77,7 +77,7 @@ def read_static_body(scan: Scanner, rules: DialectRules) -> Body:
 def read_surface_body(scan: Scanner, rules: DialectRules) -> tuple[str | None, Body]:
     """Read `[label] file [options] pose`."""
     first = scan.word("a label or a mesh file", whole=True)
-    # Builds before be353b3d have no label: the file name stands first then.
+    # Older builds of the planner have no label: the file name stands first then.
     if scan.next_is_number() or scan.next_matches(_OPTION):
         return None, _with_pose(scan, rules, first)
     return first.text, read_static_body(scan, rules)

@@ -21,9 +21,9 @@ ALL_ROBOTS = -1
 CURRENT, TURNS = 2012, 20001125
 """Versions that are written: the newest planner's, and dialect A's."""
 
-_LINK_POSES = 20001022
-# 20001025 is what dialect A's source calls legacy.
-OF_TURNS = (_LINK_POSES, 20001025, TURNS)
+# The last is what dialect A's source calls legacy; rows of both may be poses of links.
+_LINK_POSES, _LEGACY = 20001022, 20001025
+OF_TURNS = (_LINK_POSES, _LEGACY, TURNS)
 """Versions of dialect A's time, which counts angles in turns."""
 _KNOWN = (*OF_TURNS, CURRENT)
 _HEADER = "VIZMO_PATH_FILE   Path Version"
@@ -159,7 +159,7 @@ def _count(source: Source, words: list[re.Match[str]], what: str, log: Diagnosti
 def _holds_poses(head: _Head, lines: Sequence[Line], dofs: Sequence[int], links: Sequence[int]) -> bool:
     if not lines or any(len(line.numbers) != _POSE for line in lines):
         return False
-    if head.links > 1 and head.version <= max(_LINK_POSES, _KNOWN[1]):
+    if head.links > 1 and head.version in (_LINK_POSES, _LEGACY):
         return True
     # A rigid body's pose is its configuration.
     return all(parse_row(line.numbers, dofs) is None for line in lines) and any(

@@ -11,6 +11,9 @@ from .blocks import read_coordinate
 from .lexer import Scanner
 from .xml import Node
 
+PROBLEM_TAGS = ("motionplanning", "motion_planning", "mpproblem", "problem")
+"""Roots of problem files, in lower case."""
+
 _TRUE = {"true": True, "1": True, "false": False, "0": False}
 # What several ages of the planner call the same number.
 _ADJACENT_LINKS = ("ignoreIAdjacentLinks", "ignore_i_adjacent_links")

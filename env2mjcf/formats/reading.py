@@ -20,12 +20,10 @@ from . import xml_scene
 from .detect import detect, is_xml
 from .env import read_env, read_robot
 from .lexer import Scanner
-from .problem import Problem, ProblemTask, read_problem
+from .problem import PROBLEM_TAGS, Problem, ProblemTask, read_problem
 from .rows import read_query, split_row
 from .source import Source, read_source
 from .xml import Node, parse_xml
-
-_PROBLEM_TAGS = ("motionplanning", "motion_planning", "mpproblem", "problem")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +63,7 @@ def read_scene(path: PathArgument, options: Options, log: DiagnosticLog) -> Envi
     problem: Problem | None = None
     if is_xml(source):
         root = parse_xml(source, log)
-        if root.tag.lower() in _PROBLEM_TAGS:
+        if root.tag.lower() in PROBLEM_TAGS:
             problem = read_problem(root, options)
             environment = _problem_environment(problem, source, options, log)
         else:

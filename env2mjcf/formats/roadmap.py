@@ -178,11 +178,11 @@ def _compare(source: Source, counts: _Counts, nodes: Sequence[Node], *, whole: b
     if not whole:
         log.warn("CFG524", source.path, f"the roadmap ends without '{_STOP}'", hint="is the file cut off?", span=last)
     if len(nodes) != counts.nodes:
-        message = f"declares {counts.nodes} nodes, and has {len(nodes)}"
+        message = f"the roadmap declares {counts.nodes} nodes, and has {len(nodes)}"
         log.warn("CFG523", source.path, message, hint=f"write {len(nodes)}", span=counts.span)
     entries = sum(len(node.edges) for node in nodes)
     # Up to 061300 an edge was counted once, later at both of its ends.
     if counts.edges not in (entries, entries / 2):
-        message = f"declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge"
+        message = f"the roadmap declares {counts.edges} edges, and its nodes have {entries} entries, two for each edge"
         hint = f"write {entries}, or {entries // 2} up to version 061300"
         log.warn("CFG523", source.path, message, hint=hint, span=counts.span)

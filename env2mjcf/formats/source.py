@@ -26,6 +26,7 @@ _LONGEST_QUOTE, _BEFORE = 400, 60
 _MARKS = {b"\xff\xfe\0\0": "UTF-32", b"\0\0\xfe\xff": "UTF-32", b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 # Of four bytes of such text without a mark, those that are zero, for what is written in the Latin alphabet.
 _ZEROS: dict[tuple[int, ...], str] = {(1, 3): "UTF-16", (0, 2): "UTF-16", (1, 2, 3): "UTF-32", (0, 1, 2): "UTF-32"}
+# Bytes that are enough to tell.
 _ENOUGH = 64
 # Bytes that are read at once.
 _PART = 1 << 20

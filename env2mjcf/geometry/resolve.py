@@ -16,7 +16,7 @@ _GUESSES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class UnusableMesh:
     """Why a mesh file cannot be used.
 
     Attributes:
@@ -61,7 +61,7 @@ def resolve_all(environment: Environment, options: Options, log: DiagnosticLog) 
 
 def find_all(
     environment: Environment, options: Options, log: DiagnosticLog
-) -> tuple[dict[str, Path], dict[str, Problem]]:
+) -> tuple[dict[str, Path], dict[str, UnusableMesh]]:
     """Find the mesh files of a scene as `resolve_all` does, and tell what is wrong with the others.
 
     Returns:
@@ -73,14 +73,14 @@ def find_all(
             log.warn("GEO228", str(extra), f"mesh_dirs names {str(extra)!r}, which is not a folder", hint=hint)
     finder = _Finder([environment.directory, *(Path(d) for d in options.mesh_dirs)], options.allow_outside, log)
     found: dict[str, Path] = {}
-    problems: dict[str, Problem] = {}
+    problems: dict[str, UnusableMesh] = {}
     for multibody in environment.multibodies:
         for body in multibody.bodies:
             name = body.filename
             if name in found or name in problems:
                 continue
             result = finder.find(name, body.span)
-            if isinstance(result, Problem):
+            if isinstance(result, UnusableMesh):
                 problems[name] = result
             else:
                 found[name] = result
@@ -99,10 +99,10 @@ class _Finder:
         self._folded: dict[Path, dict[str, str]] = {}
         self._guesses = _GUESSES
 
-    def find(self, name: str, span: Span | None) -> Path | Problem:
+    def find(self, name: str, span: Span | None) -> Path | UnusableMesh:
         """Return where a file is, or why it cannot be used."""
         if "\0" in name:
-            return Problem("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
+            return UnusableMesh("GEO203", repr(name), f"the mesh file name {name!r} holds a NUL byte", "", span)
         slashed = name.replace("\\", "/")
         found = self._first_file(name)
         if found is None and slashed != name and (found := self._first_file(slashed)):
@@ -117,9 +117,9 @@ class _Finder:
             message = f"{str(found)!r} lies outside the scene's folder and mesh_dirs"
             folder = str(found.parent)
             hint = f"if you trust the scene: allow_outside=True (--allow-outside), or mesh_dirs=[{folder!r}]"
-            return Problem("GEO202", str(found), message, hint, span, found)
+            return UnusableMesh("GEO202", str(found), message, hint, span, found)
         if not os.access(found, os.R_OK):
-            return Problem("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span, found)
+            return UnusableMesh("GEO204", name, f"{str(found)!r} may not be read", "check its permissions", span, found)
         return found
 
     def _candidates(self, name: str) -> list[Path]:
@@ -164,15 +164,15 @@ class _Finder:
         real = os.path.realpath(path)
         return any(real == f or real.startswith(os.path.join(f, "")) for f in self._real_folders)
 
-    def _missing(self, name: str, slashed: str, span: Span | None) -> Problem:
+    def _missing(self, name: str, slashed: str, span: Span | None) -> UnusableMesh:
         candidates = self._candidates(slashed)
         for candidate in candidates:
             if os.path.lexists(candidate) and self._inside(candidate):
                 kind = "folder" if candidate.is_dir() else "broken link or a special file"
-                return Problem("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
+                return UnusableMesh("GEO203", name, f"{str(candidate)!r} is a {kind}; expected a mesh file", "", span)
         places = ", ".join(repr(str(c)) for c in candidates)
         hint = self._guess(slashed, candidates) or "add the folder that holds it to mesh_dirs (--mesh-dirs)"
-        return Problem("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
+        return UnusableMesh("GEO201", name, f"there is no mesh file {name!r}; tried {places}", hint, span)
 
     def _guess(self, name: str, candidates: list[Path]) -> str:
         """Return what a missing name may be a slip of: of the first few names, because each is compared with all."""

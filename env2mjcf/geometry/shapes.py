@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Span
+from ..errors import Span, counted
 from ..limits import Work
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
@@ -21,8 +21,6 @@ from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
-
-__all__ = ["CollisionShape", "ConvexPiece", "collision_shape"]
 
 # Triangles above which reading a file is quicker than computing its content.
 _WORTH_KEEPING = 200
@@ -138,7 +136,7 @@ def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Co
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
     made = {id(piece.polygon) for piece in pieces}
     omitted = _area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made])
-    note = f"{_count(len(faces), 'triangle')} in {_count(len(pieces), 'prism')}"
+    note = f"{counted(len(faces), 'triangle')} in {counted(len(pieces), 'prism')}"
     return CollisionShape(mesh, "surface", pieces, False, analysis, note, omitted)
 
 
@@ -149,7 +147,7 @@ def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float
 
 
 def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
-    return f"{_count(len(hulls), 'convex part')} as {'a hull' if len(hulls) == 1 else 'hulls'}"
+    return f"{counted(len(hulls), 'convex part')} as {'a hull' if len(hulls) == 1 else 'hulls'}"
 
 
 def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
@@ -175,12 +173,12 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
 
 
 def _shell_note(lining: Shells, volume: float) -> str:
-    pinned = f"{_count(lining.pinned, 'thin prism')} where there is no room" if lining.pinned else "none a thin prism"
-    split = f"{_count(lining.split, 'polygon')} split at thin spots, " if lining.split else ""
+    pinned = f"{counted(lining.pinned, 'thin prism')} where there is no room" if lining.pinned else "none a thin prism"
+    split = f"{counted(lining.split, 'polygon')} split at thin spots, " if lining.split else ""
     # A mesh that crosses itself may hold as much volume inside out as it holds otherwise.
     times = f", {lining.volume / volume:.3g} times the solid's volume" if volume > 0 else ""
     return (
-        f"{_count(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, {split}"
+        f"{counted(len(lining.pieces), 'shell cell')}, {pinned}, {lining.tilted} tilted, {split}"
         f"thinnest {lining.thinnest:.3g}{times}"
     )
 
@@ -192,7 +190,7 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         return _surface(mesh, analysis, thickness, work)
     parts = approximate_parts(analysis.vertices, analysis.faces)
     pieces = tuple(hull_piece(part, thickness) for part in parts)
-    note = f"{_count(len(pieces), 'convex part')} by CoACD, approximately"
+    note = f"{counted(len(pieces), 'convex part')} by CoACD, approximately"
     return CollisionShape(mesh, "coacd", pieces, False, analysis, note)
 
 
@@ -216,10 +214,6 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
             faces = parts[c][1].reshape(-1, 3).astype(np.int64)
             out[c] = is_convex(points[c], faces, RELATIVE_TOLERANCE * size[c])
     return out
-
-
-def _count(n: int, noun: str) -> str:
-    return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
 _STRATEGIES: dict[str, Callable[[Mesh, Analysis, float, Work], CollisionShape]] = {

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
@@ -23,6 +22,7 @@ from platformdirs import user_cache_path
 
 from ..diagnostics import DiagnosticLog
 from ..system.files import NoRegularFileError, open_regular, replaced
+from ..system.imports import installed_version
 from .serialization import pack, unpack
 
 T = TypeVar("T")
@@ -221,14 +221,9 @@ def _provenance() -> str:
     code = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         code.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return " ".join([code.hexdigest(), platform.machine(), *(f"{n}={_version(n)}" for n in ("env2mjcf", *_LIBRARIES))])
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "none"
+    return " ".join(
+        [code.hexdigest(), platform.machine(), *(f"{n}={installed_version(n)}" for n in ("env2mjcf", *_LIBRARIES))]
+    )
 
 
 def _read(path: Path, key: str) -> dict[str, NDArray[Any]]:

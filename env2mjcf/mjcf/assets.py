@@ -15,9 +15,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
 from ..kinematics.transforms import Array
 from ..model.names import file_stem, mesh_stem, unique
-from .markup import Element, add, numbers, to_text
-
-ASSET_FOLDER = "assets"
+from .markup import ASSET_FOLDER, Element, add, numbers, to_text
 
 # More faces than this in an STL file is an error of MuJoCo's loader.
 _MAX_STL_FACES = 200_000

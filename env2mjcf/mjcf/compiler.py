@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 
 from lxml import etree
 
@@ -14,6 +13,7 @@ from ..model.environment import Environment, Task
 from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
+from ..system.imports import installed_version
 from .geoms import add_contacts, excluded_obstacles
 from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
@@ -79,8 +79,8 @@ def compile_mjcf(
 def _header(assembly: Assembly, options: Options) -> str:
     environment = assembly.environment
     lines = [
-        f"Converted by env2mjcf {package_version()} from {environment.name}: dialect {environment.dialect}, "
-        f"{environment.semantics} semantics, collision {options.collision}.",
+        f"Converted by env2mjcf {installed_version() or 'unknown'} from {environment.name}: "
+        f"dialect {environment.dialect}, {environment.semantics} semantics, collision {options.collision}.",
         f"Units: metres (file unit x {options.scale:g}), kilograms, radians. Extent {assembly.extent:.6g} m.",
         f"Verdicts are certain beyond {assembly.band:.2g} m of contact, {assembly.band / assembly.extent:.2g} of it.",
     ]
@@ -92,14 +92,6 @@ def _header(assembly: Assembly, options: Options) -> str:
             if part.certificate is not None:
                 lines.append(f"  {part.certificate}")
     return f"<!--{comment_text(lines)}-->"
-
-
-def package_version() -> str:
-    """Return the installed version of env2mjcf."""
-    try:
-        return version("env2mjcf")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:

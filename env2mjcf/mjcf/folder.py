@@ -19,10 +19,10 @@ from typing import IO
 
 from ..system.files import NoRegularFileError, beside, open_regular, replaced
 from ..system.locks import FolderBusyError, LockOutcome, folder_lock, try_lock
-from .markup import files_mentioned
+from .markup import ASSET_FOLDER, files_mentioned
 
 # What a killed process leaves is removed when it is as old as this, if nobody holds it.
-STALE_SECONDS = 3600.0
+_STALE_SECONDS = 3600.0
 
 _STAGED = re.compile(r"\..+-[0-9a-f]{16}\.xml")
 _STAGED_ASSET = re.compile(r"\..+-[0-9a-f]{12}-[0-9a-f]{16}\.(?:stl|obj|xml)")
@@ -53,7 +53,7 @@ class Staged:
         self._retired: Path | None = None
         self._file: IO[bytes] | None = None
         self._begun = False
-        (folder / "assets").mkdir(parents=True, exist_ok=True)
+        (folder / ASSET_FOLDER).mkdir(parents=True, exist_ok=True)
         try:
             with folder_lock(folder):
                 with suppress(OSError):
@@ -129,12 +129,12 @@ def _remove_stale(folder: Path) -> None:
         with staged.open("rb") as file:
             if try_lock(file.fileno()) is not LockOutcome.TAKEN:
                 _remove(folder, staged)
-    for staged in _old(folder / "assets", _STAGED_ASSET):
+    for staged in _old(folder / ASSET_FOLDER, _STAGED_ASSET):
         staged.unlink(missing_ok=True)
 
 
 def _old(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
-    before = time.time() - STALE_SECONDS
+    before = time.time() - _STALE_SECONDS
     with os.scandir(folder) as listing:
         files = [i for i in listing if pattern.fullmatch(i.name) and i.is_file(follow_symlinks=False)]
         return [Path(i.path) for i in files if i.stat().st_mtime < before]
@@ -155,7 +155,7 @@ def _remove(folder: Path, staged: Path, names: Iterable[str] | None = None) -> N
             if scene != staged:
                 left -= _named(scene)
     for name in left:
-        (folder / "assets" / name).unlink(missing_ok=True)
+        (folder / ASSET_FOLDER / name).unlink(missing_ok=True)
     staged.unlink(missing_ok=True)
 
 

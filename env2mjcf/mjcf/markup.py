@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from ..formats.source import wide_encoding
 from ..kinematics.transforms import Array
 
+ASSET_FOLDER = "assets"
+"""Folder, beside an MJCF file, of the files that it refers to."""
+
 Element = Any  # lxml's classes have no public names
 
 # Without going back, which would take for ever in a file of many comments.

@@ -12,14 +12,14 @@ from ..kinematics.transforms import Array
 from ..model.environment import Boundary, Environment
 from ..options import Options
 from .joints import STANDARD_GRAVITY
-from .markup import Element, add, comment, number, numbers
+from .markup import ASSET_FOLDER, Element, add, comment, number, numbers
 
 OVERVIEW = (0.55, -1.0, 0.75)
 """Where the camera `overview` stands, seen from the scene: in front, to the right and above."""
 
 
 def gravity_of_file(environment: Environment) -> tuple[float, float, float] | None:
-    """Return the gravity that an XML file gives, in its own units of length; None where three numbers do not stand."""
+    """Return the gravity that an XML file gives, in its own units of length; None unless it is three finite numbers."""
     try:
         x, y, z = (float(word) for word in dict(environment.attributes).get("gravity", "").split())
     except ValueError:
@@ -47,7 +47,7 @@ def _thickness(part: Part) -> float:
 
 def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults."""
-    add(root, "compiler", angle="radian", autolimits="true", meshdir="assets")
+    add(root, "compiler", angle="radian", autolimits="true", meshdir=ASSET_FOLDER)
     gravity = options.acceleration(gravity_of_file(assembly.environment))
     step = time_step(assembly, gravity)
     contact = float(f"{2.5 * step:.3g}")

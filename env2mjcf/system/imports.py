@@ -1,4 +1,4 @@
-"""Imports that wait: public names that are loaded when they are first used, and work that waits for a package."""
+"""Public names that are loaded when they are first used, work that waits for a package, and versions of packages."""
 
 from __future__ import annotations
 
@@ -53,6 +53,16 @@ def after_import(name: str, work: Callable[[ModuleType], None]) -> None:
         work(import_module(name))  # waits where another thread is still importing it
     else:
         sys.meta_path.insert(0, _Finder(name, work))
+
+
+def installed_version(package: str = "env2mjcf") -> str | None:
+    """Return the version of a package; None where it is not installed, such as in a checkout."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 class _Finder(MetaPathFinder):

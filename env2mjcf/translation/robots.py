@@ -184,8 +184,8 @@ def _dressed(body: Body, losses: Losses) -> Body:
         return body
     if body.recentring is not Recentring.COM:
         message = (
-            f"{name} is not to be moved to the mean of its vertices ({body.recentring.value}); dialect "
-            f"{dialect} always does"
+            f"dialect {dialect} always moves the mean of a mesh's vertices to the origin, and {name} has the "
+            f"adjustment {body.recentring.value}"
         )
         hint = "move the mean of its vertices into the origin, or choose dialect D or E"
         losses.refuse("ENV169", name, message, hint=hint, span=span)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -119,6 +120,11 @@ def fitted(points: Array, direction: Direction, aspect: float) -> Viewpoint:
     back = max(back_x, back_y, 1e-3 * size - float(depth.min()) + 1e-9)
     position = across * right + along * up - back * forward
     return Viewpoint(_triple(position), _triple(forward))
+
+
+def box_corners(lower: Array, upper: Array) -> Array:
+    """Return the corners of a box, (8, 3)."""
+    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))
 
 
 def _centred(side: Array, depth: Array, tangent: float) -> tuple[float, float]:

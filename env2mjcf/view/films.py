@@ -42,7 +42,7 @@ class Film:
     """A film that was written.
 
     Attributes:
-        file: Where.
+        file: The .mp4 or .gif file.
         q: (n, dim) the configuration of each picture.
         fps: Pictures per second.
         touching: The contacts of each picture's configuration; empty where it is free.
@@ -80,7 +80,7 @@ def film(
         scene: The scene.
         path: (k, dim) configurations; between them the way is straight, the short way round on periodic angles.
         file: An .mp4 or .gif file to write.
-        seconds: How long the film is; by default as the path is long, from 3 to 10 seconds.
+        seconds: Length of the film; by default 3 to 10, by the length of the path.
         fps: Pictures per second; at most 50 in a .gif.
         size: Width and height in pixels; odd ones are rounded down.
         camera: As for `picture`.

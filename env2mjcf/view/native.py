@@ -9,13 +9,18 @@ from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
 
 
+def has_display() -> bool:
+    """Return whether a window can be opened; only on Linux it may not."""
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
 def require_display() -> None:
     """Make sure that a window can be opened.
 
     Raises:
         ValueError: There is no display.
     """
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not has_display():
         raise ValueError("--native opens a window, and there is no display: leave it out for the web page")
 
 

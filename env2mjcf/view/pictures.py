@@ -52,7 +52,7 @@ def picture(
         ghosts: (k, dim) configurations that are drawn nearly transparent.
         trail: (k, dim) a path: a line, and ghosts along it.
         marks: Lines and dots.
-        see_through: Draw obstacles transparent; by default only where the robots cannot be seen else.
+        see_through: Draw obstacles transparent; by default only where they would hide the robots.
 
     Returns:
         (height, width, 3) uint8, RGB.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 import tempfile
 from collections.abc import Generator, Iterable, Mapping, Sequence
@@ -21,7 +20,7 @@ from ..kinematics.tree import DofKind
 from ..mjcf.scenery import boundary_lines
 from ..options import whole
 from ..simulation.scene import Scene
-from .cameras import FIELD_OF_VIEW, Camera, Direction, Viewpoint, candidates, fitted, named_direction
+from .cameras import FIELD_OF_VIEW, Camera, Direction, Viewpoint, box_corners, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
 from .offscreen import RenderError, drawn
 
@@ -30,7 +29,7 @@ _FAR_BOUNDARY = 2.0
 # Up to so many configurations are framed by all their vertices, more of them by the boxes of their links.
 _FEW = 4
 _TINT = 0.65
-LARGEST = 8192
+_LARGEST = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +58,7 @@ class Shot:
         camera: Where to look from: a viewpoint, a direction or the name of one; None to choose.
         ghosts: (k, dim) configurations that are drawn nearly transparent, in every picture.
         marks: Drawn in every picture.
-        see_through: Whether obstacles are transparent; None where robots are hidden else.
+        see_through: Whether obstacles are transparent; None: where they would hide the robots.
         segmentation: Return which geom each pixel shows, instead of colours.
         only: Names of the bodies that are drawn; None for all.
     """
@@ -99,9 +98,10 @@ def checked_size(size: object, least: int = 1) -> tuple[int, int]:
     if len(pair) != 2 or any(isinstance(n, bool) or not isinstance(n, Integral) for n in pair):
         raise TypeError(f"size is {size!r}; expected width and height, two whole numbers of pixels")
     width, height = (whole("size", n, -sys.maxsize) for n in pair)
-    if not least <= min(width, height) <= max(width, height) <= LARGEST:
+    if not least <= min(width, height) <= max(width, height) <= _LARGEST:
         raise ValueError(
-            f"size is {width} x {height} pixels; expected at least {least} x {least} and at most {LARGEST} x {LARGEST}"
+            f"size is {width} x {height} pixels; expected at least {least} x {least}, "
+            f"and at most {_LARGEST} x {_LARGEST}"
         )
     return width, height
 
@@ -237,7 +237,7 @@ def _vertices(part: Part) -> Array:
 def _box(part: Part) -> Array:
     """Return the corners of the box around a body, (8, 3), in its own frame."""
     used = _vertices(part)
-    return np.array(list(itertools.product(*zip(used.min(axis=0), used.max(axis=0), strict=True))))
+    return box_corners(used.min(axis=0), used.max(axis=0))
 
 
 def _diagonal(points: Array) -> float:

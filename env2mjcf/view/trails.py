@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
+from .cameras import box_corners
 
-# An edge is cut so finely to be measured, and drawn.
-_PARTS_OF_AN_EDGE = 16
+# An edge is cut so finely to be measured, drawn and played.
+PARTS_OF_AN_EDGE = 16
 
 
 def reference_points(scene: Scene, q: ArrayLike) -> Array:
@@ -34,8 +35,8 @@ def reference_points(scene: Scene, q: ArrayLike) -> Array:
     return np.array(points).reshape(-1, len(poses), 3)
 
 
-def fine(scene: Scene, path: ArrayLike, parts: int = _PARTS_OF_AN_EDGE) -> Array:
-    """Return a path with every edge cut into equal parts, ((k - 1) * parts + 1, dim).
+def fine(scene: Scene, path: ArrayLike) -> Array:
+    """Return a path with every edge cut into equal parts, ((k - 1) * PARTS_OF_AN_EDGE + 1, dim).
 
     Angles that turn without end go on steadily: they may leave -pi..pi.
     """
@@ -44,7 +45,7 @@ def fine(scene: Scene, path: ArrayLike, parts: int = _PARTS_OF_AN_EDGE) -> Array
         raise ValueError(f"a path of shape {rows.shape}; expected (k, {scene.space.dim}), k > 0")
     steps = scene.space.difference(rows[:-1], rows[1:])
     unwound = rows[0] + np.concatenate([np.zeros((1, scene.space.dim)), np.cumsum(steps, axis=0)])
-    at = np.arange((len(rows) - 1) * parts + 1) / parts
+    at = np.arange((len(rows) - 1) * PARTS_OF_AN_EDGE + 1) / PARTS_OF_AN_EDGE
     knots = np.arange(len(rows), dtype=np.float64)
     return _interpolated(at, knots, unwound)
 
@@ -63,8 +64,7 @@ def lengths(scene: Scene, rows: Array) -> Array:
     links = scene.compiled.assembly.links
     for i, part in enumerate(links):
         used = part.mesh.used_vertices
-        low, high = used.min(axis=0), used.max(axis=0)
-        for corner in np.array([low, high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]:
+        for corner in box_corners(used.min(axis=0), used.max(axis=0)):
             way = poses[:, i, :3, :3] @ corner + poses[:, i, :3, 3]
             moved = np.maximum(moved, np.linalg.norm(np.diff(way, axis=0), axis=1))
     return np.concatenate([[0.0], np.cumsum(moved)])

@@ -95,6 +95,13 @@ def test_a_second_line_that_lies_is_a_warning(version: int) -> None:
     assert found.poses is not None
 
 
+@pytest.mark.parametrize("version", [20001125, 2012, 2030])
+def test_a_second_line_that_lies_makes_no_poses_of_six_degrees_of_freedom(version: int) -> None:
+    found, diagnostics = read(f"{HEAD}{version}\n2\n2\n1 2 3 0 0 0\n4 5 6 0 0 0\n", 6, links=(2,))
+    assert len(found.rows) == 2
+    assert [d.code for d in diagnostics] == ["CFG512", "CFG513"][version != 2030 :]
+
+
 def test_a_third_line_that_lies_is_a_warning_at_its_place() -> None:
     for count in (1, 3, 10**12):
         found, diagnostics = read(f"{HEAD}20001125\n1\n{count}\n1 2\n3 4\n", 2)

@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.assembly import Assembly
+from ...geometry.topology import Bools
 from ...kinematics.space import ConfigurationSpace
 from ...kinematics.transforms import Array
 from ...pairs import Pair
 from ..surfaces import Surfaces
-from .instructions import program
+from .instructions import scene_tables
 from .tables import WIDTHS, Tables, packed
-
-Bools = NDArray[np.bool_]
 
 
 def available() -> bool:
@@ -57,7 +56,7 @@ class ExactEngine:
         self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair], surfaces: Surfaces
     ) -> None:
         require()
-        self._tables = program(assembly, space, pairs, surfaces)
+        self._tables = scene_tables(assembly, space, pairs, surfaces)
         self._entries = entries()
         self._collisions = self._entries.collisions
 

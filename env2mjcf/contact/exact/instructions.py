@@ -21,7 +21,7 @@ from .tables import LANES, BoundaryKind, Tables, packed
 from .wide_tree import WideTree, box_tree, depth, wide_tree
 
 
-def program(
+def scene_tables(
     assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair], surfaces: Surfaces
 ) -> tuple[Ints, Floats]:
     """Return the tables of a scene, see `tables.packed`.

@@ -160,8 +160,8 @@ class NumberFile:
         except TooMuchWorkError as stopped:
             worst = int(kept[stopped.part])
             message = (
-                f"to cut the polygons into triangles takes too long: more than {limits.polygon_work} points would have "
-                f"to be looked at; this polygon has {counts[worst]} corners and is not convex"
+                f"cutting the polygons into triangles takes too long: more than {limits.polygon_work} points would "
+                f"have to be looked at; this polygon has {counts[worst]} corners and is not convex"
             )
             hint = f"triangulate the mesh, or {Limits.hint('polygon_work')}"
             log.fail("GEO270", path, message, hint=hint, span=place(worst))

@@ -19,7 +19,7 @@ _NUMBERS = 3_000_000  # heights held in memory at once
 _ROUNDS = 200
 
 
-def near(low: Floats, high: Floats, lows: Floats, highs: Floats, work: Work) -> tuple[Ints, Ints]:
+def _overlapping(low: Floats, high: Floats, lows: Floats, highs: Floats, work: Work) -> tuple[Ints, Ints]:
     """Return the index pairs of boxes (g, 3) and other boxes (m, 3) that overlap, ordered by the former.
 
     Raises:
@@ -59,7 +59,7 @@ def _morton(points: Floats) -> Ints:
     return out
 
 
-def clipped(triangles: Floats, planes: Floats) -> tuple[Floats, Ints]:
+def _clipped(triangles: Floats, planes: Floats) -> tuple[Floats, Ints]:
     """Cut each triangle to the half-spaces `x . plane[:3] + plane[3] >= 0` (Sutherland and Hodgman, 1974).
 
     Args:
@@ -125,35 +125,37 @@ def fit(group: Group, around: Surroundings) -> None:
         group: Its slopes, heights and `tilted` are changed.
         around: The surface.
     """
-    cell, other = _near(group, around)
+    cell, other = _may_meet(group, around)
     for _ in range(_ROUNDS):
         if len(cell) == 0:
             return
-        found = [_extent(group, *block) for block in pieces(group, around, cell, other)]
+        found = [_extent(group, *block) for block in _clipped_pieces(group, around, cell, other)]
         cell, other, start, ratio = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if len(cell):
             _give_way(group, cell, start, ratio)
     group.height[np.unique(cell)] = 0.0
 
 
-def within(group: Group, around: Surroundings) -> Floats:
+def corners_within(group: Group, around: Surroundings) -> Floats:
     """Return the corners (n, 3), about the cell's centre, of all that reaches into a group of one cell."""
-    blocks = pieces(group, around, *_near(group, around))
+    blocks = _clipped_pieces(group, around, *_may_meet(group, around))
     return np.concatenate(
         [np.zeros((0, 3)), *(points[np.arange(points.shape[1]) < count[:, None]] for _, _, points, count in blocks)]
     )
 
 
-def _near(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
+def _may_meet(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
     """Return the pairs of cells and triangles that may meet and matter."""
     low, high = group.boxes()
-    cell, other = near(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1), around.work)
+    cell, other = _overlapping(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1), around.work)
     kind, blocking = around.kind[group.members][cell], around.blocking[other]
     matters = (kind < 0) | (blocking < 0) | (kind == blocking)
     return cell[matters], other[matters]
 
 
-def pieces(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Iterator[tuple[Ints, Ints, Floats, Ints]]:
+def _clipped_pieces(
+    group: Group, around: Surroundings, cell: Ints, other: Ints
+) -> Iterator[tuple[Ints, Ints, Floats, Ints]]:
     """Yield blocks of cells, triangles, and what of each triangle lies in the cell: corners (n, k, 3), counts (n,)."""
     step = max(1, _NUMBERS // (3 * (group.corners.shape[1] + 2)))
     for i in range(0, len(cell), step):
@@ -163,7 +165,7 @@ def pieces(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Itera
         planes = group.planes(c, around.margin)
         chosen = np.flatnonzero(~_behind_a_plane(local, planes))
         c, t, local, planes = c[chosen], t[chosen], local[chosen], planes[chosen]
-        points, count = clipped(local, planes)
+        points, count = _clipped(local, planes)
         chosen = np.flatnonzero(count)
         yield c[chosen], t[chosen], points[chosen], count[chosen]
 

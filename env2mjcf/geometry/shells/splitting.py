@@ -9,7 +9,7 @@ import numpy as np
 
 from ..topology import Bools, Floats
 from .cells import Group, group_of
-from .fitting import Surroundings, fit, within
+from .fitting import Surroundings, corners_within, fit
 
 THIN = 0.25
 """Depth in units of the greatest one below which a cell is worth cutting."""
@@ -37,7 +37,7 @@ def split_thin(group: Group, wanted: Floats, around: Surroundings, cap: float) -
         cap: Greatest height of a cell.
 
     Returns:
-        Row and fitted parts, groups of one, of each polygon of which most is at least twice as thick thereby.
+        Row and fitted parts, groups of one, of each polygon most of which becomes at least twice as thick.
     """
     out: list[tuple[int, list[Group]]] = []
     for row in np.flatnonzero(_worth_cutting(group, cap)).tolist():
@@ -74,7 +74,7 @@ def _parts(
         yield fitted
         return
     part = _flat(fitted, 0, slopes)
-    spot = within(cell(min(cap, _SPOT * float(fitted.depth()[0]))), around)
+    spot = corners_within(cell(min(cap, _SPOT * float(fitted.depth()[0]))), around)
     free, rest = _cut_free(part, part.projected(spot), cap)
     if not free:
         yield fitted

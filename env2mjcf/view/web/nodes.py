@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ from ...geometry.assembly import Assembly, Part
 from ...kinematics.transforms import Array, quaternion_from_matrix
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
-from ..cameras import FIELD_OF_VIEW, fitted, named_direction
+from ..cameras import FIELD_OF_VIEW, box_corners, fitted, named_direction
 
 if TYPE_CHECKING:
     import viser
@@ -35,7 +34,7 @@ class WebScene:
     """The bodies of a scene on a page.
 
     Args:
-        server: The page.
+        server: The server of the page.
         scene: The scene.
     """
 
@@ -145,7 +144,7 @@ def set_stage(server: viser.ViserServer, scene: Scene, rows: Array) -> None:
     """Set a page up for a scene.
 
     Args:
-        server: The page.
+        server: The server of the page.
         scene: The scene.
         rows: (n, dim) configurations that the camera is to see besides home.
     """
@@ -175,7 +174,7 @@ def _add_lights(server: viser.ViserServer) -> None:
 
 def _place_camera(server: viser.ViserServer, lower: Array, upper: Array) -> None:
     """Look from where the MJCF's `overview` stands, as near as a whole box is seen in a square picture."""
-    view = fitted(_corners(lower, upper), named_direction("overview"), 1.0)
+    view = fitted(box_corners(lower, upper), named_direction("overview"), 1.0)
     position, forward = np.array(view.position), np.array(view.forward)
     distance = float(((lower + upper) / 2 - position) @ forward)
     camera = server.initial_camera
@@ -200,7 +199,7 @@ def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
     if len(rows) and scene.link_names:
         poses = scene.link_poses(rows)
         for i, part in enumerate(assembly.links):
-            corners = _corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
+            corners = box_corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
             world = np.einsum("nij,cj->nci", poses[:, i, :3, :3], corners) + poses[:, i, None, :3, 3]
             lower, upper = np.minimum(lower, world.min(axis=(0, 1))), np.maximum(upper, world.max(axis=(0, 1)))
     if assembly.environment.boundary is not None:
@@ -209,8 +208,3 @@ def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
         if np.linalg.norm(high - low) <= _BOUNDARY_SEEN * np.linalg.norm(upper - lower):
             return low, high
     return lower, upper
-
-
-def _corners(lower: Array, upper: Array) -> Array:
-    """Return the corners of a box, (8, 3)."""
-    return np.array(list(itertools.product(*zip(lower, upper, strict=True))))

@@ -54,8 +54,8 @@ class Page:
     """Builds the panel, and keeps it up to date.
 
     Args:
-        server: The page.
-        sliders: What they move.
+        server: The server of the page.
+        sliders: The degrees of freedom.
         scene: The scene.
         track: The path, if there is one.
         controls: What is told when something is pressed or moved.

@@ -11,14 +11,12 @@ import numpy as np
 from ...diagnostics import DiagnosticLog
 from ...kinematics.transforms import Array
 from ...simulation.scene import Scene
-from ..trails import fine, lengths
+from ..trails import PARTS_OF_AN_EDGE, fine, lengths
 
 # Playing through takes as long as it takes to cross the scene so often, and no less or more than these.
 _SECONDS_PER_EXTENT = 5.0
 _LEAST_SECONDS, _MOST_SECONDS = 3.0, 60.0
 _TICK = 1 / 30
-# An edge is cut so finely to be measured.
-_PARTS = 16
 
 
 class Track:
@@ -34,7 +32,7 @@ class Track:
 
     def __init__(self, scene: Scene, q: Array) -> None:
         self.q = scene.space.check(q)
-        self._rows = fine(scene, self.q, _PARTS)
+        self._rows = fine(scene, self.q)
         self._far = lengths(scene, self._rows)
         # Where nothing moves, time stands still.
         self._keep = np.concatenate([[True], np.diff(self._far) > 0])
@@ -61,7 +59,7 @@ class Track:
             return len(self.q) - 1
         # Places that are sums of many parts are a rounding error before where they should be.
         place = fraction * self.length * (1 + 1e-12)
-        return (int(np.searchsorted(self._far, place, side="right")) - 1) // _PARTS
+        return (int(np.searchsorted(self._far, place, side="right")) - 1) // PARTS_OF_AN_EDGE
 
 
 def report_doubtful(scene: Scene, q: Array, file: str, log: DiagnosticLog) -> None:

@@ -34,7 +34,7 @@ class Viewer:
     All tabs that look at the page see the same.
 
     Args:
-        server: The page.
+        server: The server of the page.
         scene: The scene.
         path: (k, dim) configurations to be played, or None.
 
