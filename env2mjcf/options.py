@@ -213,7 +213,8 @@ def _pair(value: Any) -> tuple[str, str]:
 
 def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
     values: tuple[Any, ...] = tuple(value)
-    if len(values) != 3 or not all(isinstance(g, Real) and abs(g) <= LARGEST for g in values):
+    three = len(values) == 3 and all(isinstance(g, Real) for g in values)
+    if not (three and all(abs(g) <= LARGEST for g in values)):
         raise ValueError(f"gravity must be three finite numbers, got {values!r}")
     return tuple(float(g) for g in values)
 

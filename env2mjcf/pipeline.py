@@ -13,7 +13,6 @@ from .errors import Diagnostic
 from .formats.reading import read_scene
 from .geometry.assembly import Assembly, assemble
 from .kinematics.space import ConfigurationSpace
-from .kinematics.transforms import Array
 from .kinematics.tree import dof_names
 from .limits import Limits
 from .mjcf.compiler import Document, compile_mjcf
@@ -22,6 +21,7 @@ from .model.environment import Environment
 from .model.scaling import scaled
 from .options import Options, PathArgument
 from .pairs import PairTable, Robot, pair_table
+from .transforms import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,13 @@ import numpy as np
 
 from .kinematics.forward import RobotKinematics
 from .kinematics.space import ConfigurationSpace
-from .kinematics.transforms import Array
 from .kinematics.tree import dof_names
 from .model.dialects import RULES
 from .model.environment import Boundary, DHForm, Dialect, Environment, MultiBody, Resolution
 from .model.names import body_names
 from .model.scaling import scaled
 from .options import Options
+from .transforms import Array
 
 _TOLD_BY = {
     Dialect.A: "begins with a count, then 'MultiBody'",

@@ -10,8 +10,6 @@ from pathlib import Path
 
 PICTURE = Path(__file__).with_suffix(".svg")
 PACKAGE = Path(__file__).resolve().parents[2] / "env2mjcf"
-# A second name for modules, not a room.
-ALIASES = ("transforms",)
 GROUPS = {
     "said": ("what is said and asked for", "#f3f4f6", "#9ca3af"),
     "file": ("what a file says", "#e8f1fb", "#6b9bd1"),
@@ -28,6 +26,7 @@ ROOMS = {
     "limits": (0.0, "said", "bounds on input and work"),
     "options": (0.0, "said", "what a user may choose"),
     "system": (0.0, "said", "files, locks, imports"),
+    "transforms": (1.0, "file", "poses as 4 x 4 matrices"),
     "kinematics": (0.5, "file", "frames, joints, q and qpos"),
     "formats": (0.5, "file", "text, XML and meshes"),
     "pairs": (1.55, "file", "which bodies are tested"),
@@ -99,9 +98,9 @@ def imports() -> dict[str, set[str]]:
     below: dict[str, set[str]] = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         room = path.relative_to(PACKAGE).with_suffix("").parts[0]
-        if room not in ("__init__", *ALIASES):
+        if room != "__init__":
             rooms = {name.split(".")[1] for name in imported(path, public) if "." in name}
-            below.setdefault(room, set()).update(rooms - {room, "__version__", *ALIASES})
+            below.setdefault(room, set()).update(rooms - {room, "__version__"})
     return below
 
 

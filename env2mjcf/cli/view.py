@@ -20,8 +20,8 @@ from .program import DONE
 from .terminal import loaded, one_line, print_diagnostics, print_json
 
 if TYPE_CHECKING:
-    from ..kinematics.transforms import Array
     from ..simulation.scene import Scene
+    from ..transforms import Array
 
 
 @dataclass(frozen=True, slots=True)

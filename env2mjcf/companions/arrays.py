@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
 from ..kinematics.space import ConfigurationSpace, listed
-from ..kinematics.transforms import Array
 from ..limits import LARGEST
+from ..transforms import Array
 
 _WHAT_TO_DO = "write it with numpy.save(path, array), an array of floats of shape (n, {dim})"
 

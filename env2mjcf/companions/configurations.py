@@ -14,12 +14,12 @@ from ..formats.path import is_path
 from ..formats.roadmap import is_roadmap
 from ..formats.rows import read_query
 from ..formats.source import Source, read_source
-from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..model.environment import Task
 from ..options import PathArgument
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Query, Scene
+from ..transforms import Array
 from .paths import path_record
 from .query_files import dofs_of
 from .records import Configurations, Graph, Poses, expected, joined, of_array, of_text, row_of

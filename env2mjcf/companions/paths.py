@@ -14,12 +14,12 @@ from ..errors import Diagnostic
 from ..formats import path as text
 from ..formats.source import Source, read_source
 from ..kinematics.forward import configuration_of_poses
-from ..kinematics.transforms import Array, pose_gaps, rotation_matrix, transform
 from ..limits import Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
+from ..transforms import Array, pose_gaps, rotation_matrix, transform
 from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.

@@ -15,13 +15,13 @@ from ..formats import rows as text
 from ..formats.path import ALL_ROBOTS
 from ..formats.source import read_source
 from ..kinematics.space import ConfigurationSpace
-from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Dialect, Task
 from ..options import PathArgument, whole
 from ..simulation.scene import Query, Scene
 from ..system.files import output
+from ..transforms import Array
 
 
 def read_query(

@@ -14,10 +14,10 @@ from ..diagnostics import DiagnosticLog
 from ..formats.rows import check_rows, coordinate, coordinate_hint, split_row
 from ..formats.source import Source, read_source
 from ..kinematics.space import listed
-from ..kinematics.transforms import Array
 from ..limits import Limits
 from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
+from ..transforms import Array
 from .arrays import coordinates, map_array
 from .query_files import dofs_of
 

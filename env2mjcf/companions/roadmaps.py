@@ -18,11 +18,11 @@ from ..formats import roadmap as text
 from ..formats.graph import Edge, Node
 from ..formats.lexer import parse_number
 from ..formats.source import Source, read_source
-from ..kinematics.transforms import Array, real_array
 from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..options import PathArgument, whole
 from ..simulation.scene import Scene
+from ..transforms import Array, real_array
 from .query_files import configurations, dofs_of, file_numbers, from_turns, write
 
 Indices = NDArray[np.int64]

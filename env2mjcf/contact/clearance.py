@@ -8,8 +8,8 @@ import numpy as np
 
 from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs, Search
-from ..kinematics.transforms import Array
 from ..pairs import Pair
+from ..transforms import Array
 from .separation import separations
 from .surfaces import Surfaces
 

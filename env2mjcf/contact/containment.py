@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
 from ..geometry.orientation import encloses_any
-from ..kinematics.transforms import Array
 from ..model.environment import Boundary
 from ..pairs import Pair
+from ..transforms import Array
 from .types import Outside
 
 # Of a vertex that lies exactly on the boundary, as a fraction of the boundary's size.

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
-from ..kinematics.transforms import Array
 from ..kinematics.tree import POSITIONS, ROTATIONS, DofKind
 from ..options import positive
 from ..pairs import Pair
+from ..transforms import Array
 
 # Without a resolution in the file, a step is this fraction of the extent.
 _DEFAULT_RESOLUTION = 0.01

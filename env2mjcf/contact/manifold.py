@@ -11,8 +11,8 @@ from ..geometry.assembly import Part
 from ..geometry.distance import nearest
 from ..geometry.topology import Floats
 from ..geometry.triangle_search import Jobs, Search
-from ..kinematics.transforms import Array
 from ..pairs import Pair
+from ..transforms import Array
 from .clearance import BAND, Clearance
 from .separation import nearest_points, separations
 from .surfaces import Surface, Surfaces, unit_normals

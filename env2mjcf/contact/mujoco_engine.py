@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kinematics.transforms import Array
 from ..pairs import Pair
+from ..transforms import Array
 from .types import Contact, deepest
 
 

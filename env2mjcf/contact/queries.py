@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Part
-from ..kinematics.transforms import Array
 from ..options import Collision, Engine
 from ..pipeline import Compiled
 from ..system.locks import Lock, lazy_property
+from ..transforms import Array
 from .clearance import BAND, Clearance
 from .containment import BoundaryTest, Containment
 from .edges import EdgeSteps, MotionBounds, certified, even_rows

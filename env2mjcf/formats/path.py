@@ -10,7 +10,7 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
-from ..kinematics.transforms import Array
+from ..transforms import Array
 from .lexer import parse_number
 from .rows import Extra, Line, Row, fitting, judge_rows, number_lines, parse_row, regrouped, row_text
 from .source import Source

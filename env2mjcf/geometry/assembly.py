@@ -10,11 +10,11 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..kinematics.forward import RobotKinematics
-from ..kinematics.transforms import Array
 from ..limits import LARGEST, Limits, Work, bounded
 from ..model.environment import Body, Environment, JointType, MultiBody, Recentring
 from ..model.names import body_names
 from ..options import Options
+from ..transforms import Array
 from .analysis import Analysis
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial

@@ -7,7 +7,7 @@ from math import copysign, hypot
 
 import numpy as np
 
-from ..kinematics.transforms import quaternion_from_matrix
+from ..transforms import quaternion_from_matrix
 from .analysis import Analysis
 from .mesh import Mesh
 from .topology import RELATIVE_TOLERANCE, Floats, area_vectors

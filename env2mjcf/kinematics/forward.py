@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..diagnostics import DiagnosticLog
 from ..model.environment import BaseKind, DHForm, Dialect, MultiBody, Pose
 from ..system.locks import lazy_property
-from .transforms import (
+from ..transforms import (
     Array,
     angles_from_quaternion,
     dh_matrix,

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..model.dialects import RULES
 from ..model.environment import BaseKind, Boundary, DHForm, JointType, Task
 from ..options import whole
+from ..transforms import Array, angles_from_quaternion, quaternion_from_angles, real_array, wrap
 from .forward import RobotKinematics
-from .transforms import Array, angles_from_quaternion, quaternion_from_angles, real_array, wrap
 from .tree import POSITIONS, DofKind
 
 

@@ -13,8 +13,8 @@ from trimesh.exchange.stl import export_stl
 
 from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
-from ..kinematics.transforms import Array
 from ..model.names import file_stem, mesh_stem, unique
+from ..transforms import Array
 from .markup import ASSET_FOLDER, Element, add, numbers, to_text
 
 # More faces than this in an STL file is an error of MuJoCo's loader.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..geometry.assembly import Part
-from ..kinematics.transforms import quaternion_from_matrix
 from ..pairs import PairTable
+from ..transforms import quaternion_from_matrix
 from .assets import AssetBook
 from .markup import Element, add, comment, numbers
 

@@ -13,9 +13,9 @@ import numpy as np
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import RobotParts
 from ..kinematics.space import ConfigurationSpace, joint_kinds
-from ..kinematics.transforms import inverse
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind
+from ..transforms import inverse
 from .markup import Element, add, number, numbers, tidy
 
 STANDARD_GRAVITY = 9.80665

@@ -10,10 +10,10 @@ from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
 from ..kinematics.space import ConfigurationSpace, children_first_to_last
-from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind, build_tree
 from ..model.environment import Environment
 from ..options import Options
+from ..transforms import Array, inverse, quaternion_from_matrix
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
 from .joints import add_base_joints, add_connection_joints

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import RobotParts
-from ..kinematics.transforms import Array, inverse, quaternion_from_matrix
 from ..kinematics.tree import DofKind
 from ..model.environment import JointType
+from ..transforms import Array, inverse, quaternion_from_matrix
 from .links import Compilation
 from .markup import Element, add, numbers, tidy
 

@@ -13,7 +13,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from ..formats.source import wide_encoding
-from ..kinematics.transforms import Array
+from ..transforms import Array
 
 ASSET_FOLDER = "assets"
 """Folder, beside an MJCF file, of the files that it refers to."""

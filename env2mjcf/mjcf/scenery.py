@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from ..geometry.assembly import Assembly, Part
-from ..kinematics.transforms import Array
 from ..model.environment import Boundary, Environment
 from ..options import Options
+from ..transforms import Array
 from .joints import STANDARD_GRAVITY
 from .markup import ASSET_FOLDER, Element, add, comment, number, numbers
 

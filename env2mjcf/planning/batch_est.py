@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kinematics.transforms import Array
+from ..transforms import Array
 from .planner_space import PlanningSpace, Validity
 from .planners import BATCH
 

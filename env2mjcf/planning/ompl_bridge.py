@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from ompl import base, geometric, util
 
-from ..kinematics.transforms import Array, wrap
+from ..transforms import Array, wrap
 from .planner_space import PlanningSpace, Validity
 from .planners import OMPL_PLANNERS
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.edges import MotionBounds
-from ..kinematics.transforms import Array
 from ..kinematics.tree import POSITIONS
 from ..simulation.scene import Scene
+from ..transforms import Array
 
 # What moves nothing (a degree of freedom that only closes a loop) weighs this part of what moves most: its way counts
 # for hardly anything, and yet configurations that differ in it are not the same.

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from typing import Protocol
 
 from ..errors import did_you_mean
-from ..kinematics.transforms import Array
+from ..transforms import Array
 from .planner_space import PlanningSpace, Validity
 
 # Their names here, and OMPL's classes. Planners that need a space of their own kind (BIT*, AORRTC, informed

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import DiagnosticLog
-from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.locks import Lock
+from ..transforms import Array
 from .planner_space import PlanningSpace
 from .planners import checked_planner
 from .result import Plan, Progress, Timekeeper

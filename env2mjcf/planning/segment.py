@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
+from ..transforms import Array
 from .batch_est import ExpandingRun
 from .planner_space import PlanningSpace, Validity
 from .planners import AUTO, BATCH, OPTIMISING, CountedRun, RoundRobin, Run

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..contact.edges import EdgeSteps, even_rows
 from ..contact.types import Verdict
 from ..diagnostics import DiagnosticLog
-from ..kinematics.transforms import Array
+from ..transforms import Array
 from .scene import Scene
 
 Indices = NDArray[np.int64]

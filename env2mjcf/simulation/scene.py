@@ -23,12 +23,12 @@ from ..contact.threads import ask, thread_count
 from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
-from ..kinematics.transforms import Array, real_array
 from ..model.environment import Environment
 from ..options import Engine
 from ..pipeline import Compiled
 from ..report import Report, report
 from ..system.locks import Lock
+from ..transforms import Array, real_array
 from .mujoco_model import load_spec
 
 _ENGINES = get_args(Engine)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..contact.containment import BoundaryTest
 from ..contact.types import Contact, Reason, Verdict, deepest
-from ..kinematics.transforms import Array
 from ..options import whole
+from ..transforms import Array
 from .scene import Scene
 
 

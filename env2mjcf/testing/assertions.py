@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.types import Reason
-from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
 from ..simulation.verdicts import any_rough
+from ..transforms import Array
 from ..view.offscreen import RenderError
 from ..view.pictures import picture as draw
 

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..formats.writers import settled, written_limits
-from ..kinematics.transforms import Array, dh_matrix, inverse, pose_matrix
 from ..model.dialects import RULES
 from ..model.environment import Connection, DHForm, DHParameters, Dialect, JointLimits, JointType, MultiBody, Pose
+from ..transforms import Array, dh_matrix, inverse, pose_matrix
 from .scene_parts import Losses
 
 

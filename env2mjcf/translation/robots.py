@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
 from ..kinematics.forward import RobotKinematics
-from ..kinematics.transforms import Array, wrap
 from ..kinematics.tree import Dof, DofKind, build_tree
 from ..model.dialects import RULES, SurfaceLabels
 from ..model.environment import BaseKind, Body, MultiBody, MultiBodyKind, Pose, Recentring, Task
+from ..transforms import Array, wrap
 from .connections import connections, six_numbers, swaps_angles
 from .scene_parts import Losses
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.transforms import Array
 from ..mjcf.scenery import OVERVIEW
+from ..transforms import Array
 
 # Vertical field of view in radians: narrow, so that parallels stay nearly so.
 FIELD_OF_VIEW = math.radians(36.0)

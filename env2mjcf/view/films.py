@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.types import Contact
-from ..kinematics.transforms import Array
 from ..options import positive, whole
 from ..simulation.scene import Scene
 from ..system.files import output
+from ..transforms import Array
 from .cameras import Camera, Viewpoint
 from .marks import TRAIL, Polyline
 from .offscreen import RenderError, read_exactly

@@ -9,10 +9,10 @@ import numpy as np
 from ..companions.records import Configurations
 
 if TYPE_CHECKING:
-    from ..kinematics.transforms import Array
     from ..simulation.edge_verdicts import EdgeVerdicts
     from ..simulation.scene import Scene
     from ..simulation.verdicts import Verdicts
+    from ..transforms import Array
     from .marks import Color, Mark
 
 # A line is cut so finely that a turning robot's way looks round.

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kinematics.transforms import real_array
 from ..options import positive
+from ..transforms import real_array
 
 Color = tuple[float, float, float, float]
 

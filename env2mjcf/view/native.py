@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 
-from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
+from ..transforms import Array
 
 
 def has_display() -> bool:

@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 
 from ..geometry.assembly import Part
-from ..kinematics.transforms import Array
 from ..kinematics.tree import DofKind
 from ..mjcf.scenery import boundary_lines
 from ..options import whole
 from ..simulation.scene import Scene
+from ..transforms import Array
 from .cameras import FIELD_OF_VIEW, Camera, Direction, Viewpoint, box_corners, candidates, fitted, named_direction
 from .marks import BAD, WIRE, Mark, Polyline
 from .offscreen import RenderError, drawn

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kinematics.transforms import Array
 from ..simulation.scene import Scene
+from ..transforms import Array
 from .cameras import box_corners
 
 # An edge is cut so finely to be measured, drawn and played.

@@ -13,7 +13,7 @@ from scenes import free_cube, without_privileges, write_scene
 
 import env2mjcf
 from env2mjcf import ConversionError, FormatError, Query, Roadmap, Scene
-from env2mjcf.kinematics.transforms import angles_from_quaternion, quaternion_from_matrix
+from env2mjcf.transforms import angles_from_quaternion, quaternion_from_matrix
 
 ARM = "FreeBody 0 cube.g 0 0 0 0 0 0\nFreeBody 1 cube.g\nFreeBody 2 cube.g\n"
 JOINTS = (

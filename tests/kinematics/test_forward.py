@@ -13,8 +13,8 @@ from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.formats.path import read_path
 from env2mjcf.formats.source import read_source
 from env2mjcf.kinematics.forward import RobotKinematics
-from env2mjcf.kinematics.transforms import rotation_matrix
 from env2mjcf.limits import Limits
+from env2mjcf.transforms import rotation_matrix
 
 SEED_ROBOT = """1
 MultiBody Active

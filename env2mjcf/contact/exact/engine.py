@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from ...geometry.assembly import Assembly
 from ...geometry.topology import Bools
 from ...kinematics.space import ConfigurationSpace
-from ...kinematics.transforms import Array
 from ...pairs import Pair
+from ...transforms import Array
 from ..surfaces import Surfaces
 from .instructions import scene_tables
 from .tables import WIDTHS, Tables, packed

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ...geometry.assembly import Assembly
 from ...geometry.topology import Floats, Ints
 from ...kinematics.space import ConfigurationSpace
-from ...kinematics.transforms import inverse, transform
 from ...model.environment import Boundary
 from ...pairs import Pair
+from ...transforms import inverse, transform
 from ..containment import ROUNDING
 from ..surfaces import Surfaces
 from .motions import Motions

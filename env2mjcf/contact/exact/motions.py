@@ -9,9 +9,9 @@ import numpy as np
 
 from ...geometry.topology import Floats, Ints
 from ...kinematics.forward import RobotKinematics
-from ...kinematics.transforms import dh_matrix, pose_matrix
 from ...kinematics.tree import POSITIONS, ROTATIONS, DofKind
 from ...model.environment import BaseKind, DHForm
+from ...transforms import dh_matrix, pose_matrix
 
 WORLD = -1
 """The parent of a step that begins at the origin; the column of a number that is zero."""

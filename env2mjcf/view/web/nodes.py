@@ -9,9 +9,9 @@ import numpy as np
 
 from ...contact.types import Contact
 from ...geometry.assembly import Assembly, Part
-from ...kinematics.transforms import Array, quaternion_from_matrix
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
+from ...transforms import Array, quaternion_from_matrix
 from ..cameras import FIELD_OF_VIEW, box_corners, fitted, named_direction
 
 if TYPE_CHECKING:

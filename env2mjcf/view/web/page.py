@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Protocol
 from ...contact.types import Verdict
 from ...errors import one_line
 from ...kinematics.space import ConfigurationSpace
-from ...kinematics.transforms import Array
 from ...simulation.scene import Query, Scene
+from ...transforms import Array
 from .playback import Track
 from .sliders import Slider, Sliders
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...diagnostics import DiagnosticLog
-from ...kinematics.transforms import Array
 from ...simulation.scene import Scene
+from ...transforms import Array
 from ..trails import PARTS_OF_AN_EDGE, fine, lengths
 
 # Playing through takes as long as it takes to cross the scene so often, and no less or more than these.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.transforms import Array
 from ...model.dialects import RULES, DialectRules
 from ...simulation.scene import Scene
+from ...transforms import Array
 
 # A slider has about so many steps.
 _STEPS = 1000

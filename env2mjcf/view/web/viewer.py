@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from ...contact.types import Contact, Verdict, deepest
-from ...kinematics.transforms import Array
 from ...options import Engine
 from ...simulation.scene import Scene
+from ...transforms import Array
 from ..trails import paced, reference_points
 from .nodes import WebScene, set_stage
 from .page import Page

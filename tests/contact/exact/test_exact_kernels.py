@@ -15,7 +15,7 @@ from env2mjcf.contact.exact.tables import BLOCK, LANES
 from env2mjcf.contact.exact.wide_tree import box_tree, depth, wide_tree
 from env2mjcf.geometry.distance import nearest
 from env2mjcf.geometry.orientation import winding_numbers
-from env2mjcf.kinematics.transforms import rotation_matrix, transform
+from env2mjcf.transforms import rotation_matrix, transform
 
 pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from env2mjcf.kinematics.transforms import (
+from env2mjcf.model.environment import DHForm, Pose
+from env2mjcf.transforms import (
     angles_from_quaternion,
     dh_matrix,
     inverse,
@@ -21,7 +22,6 @@ from env2mjcf.kinematics.transforms import (
     transform,
     wrap,
 )
-from env2mjcf.model.environment import DHForm, Pose
 
 ANGLES = st.tuples(*[st.floats(-4, 4)] * 3)
 
