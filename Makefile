@@ -22,7 +22,7 @@ demo: $(VENV)/demo.stamp  ## convert the seed scene, let it fall, report contact
 	@$(BIN)/python models/demo.py
 
 test: $(VENV)/test.stamp  ## run the quick tests; PYTEST_FLAGS="-k alpha" picks some, PYTEST_FLAGS="-m slow" the slow ones
-	$(BIN)/python -m pytest -n 2 $(PYTEST_FLAGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_FLAGS)
 
 lint: $(VENV)/lint.stamp  ## ruff, its formatter, the layers of the package, pyright
 	$(BIN)/ruff check

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 from texts import read, read_robot  # noqa: F401  fixtures
 
+# Two workers share the cores: the threads of each one's OpenBLAS would wait for those of the other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # What is hidden from this process is hidden from its children too.
 if os.environ.get("ENV2MJCF_TEST_WITHOUT"):
     _hiding = Path(__file__).parent / "support" / "without"

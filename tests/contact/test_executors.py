@@ -65,6 +65,7 @@ def test_verdicts_are_those_of_this_thread(cubes: env2mjcf.Scene, executor: Exec
     assert cubes.in_collision(q[:0], executor=executor).shape == (0,)
 
 
+@pytest.mark.slow_but("fork")
 def test_clearances_edges_and_contacts_are_the_same_numbers(cubes: env2mjcf.Scene, executor: Executor) -> None:
     q, to = near(cubes, 60), near(cubes, 60, seed=1)
     np.testing.assert_array_equal(cubes.clearance(q, executor=executor), cubes.clearance(q))

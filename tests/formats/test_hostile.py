@@ -138,7 +138,12 @@ class TestTime:
     @staticmethod
     def grows(run: Callable[[str], object], make: Callable[[int], str], size: int) -> float:
         small, large = make(size), make(4 * size)
-        return TestTime.best(run, large) / max(1e-3, TestTime.best(run, small))
+        # What is quadratic is so every time; what the machine does besides is not.
+        for _ in range(3):
+            ratio = TestTime.best(run, large) / max(1e-3, TestTime.best(run, small))
+            if ratio < 10:
+                break
+        return ratio
 
     @staticmethod
     def best(run: Callable[[str], object], text: str) -> float:

@@ -227,6 +227,7 @@ def test_the_maze_is_solved_and_triangles_agree(maze: env2mjcf.Scene):
     assert_free_by_triangles(maze, found.path, 0.02)
 
 
+@pytest.mark.slow_but("RRTConnect", "BatchEST", "KPIECE", "FMT")
 @pytest.mark.parametrize("planner", sorted(set(PLANNERS) - {"auto"}))
 def test_every_planner_finds_its_way_round_a_cube(planner: str, room: Path):
     scene = env2mjcf.load(room / "open.env", query=room / "cross.query")

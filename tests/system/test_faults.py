@@ -220,6 +220,7 @@ class TestRaces:
             }  # fmt: skip
             assert folders.foreign_untouched(out)
 
+    @pytest.mark.slow_but("share")
     @pytest.mark.parametrize("what", ["one scene", "two scenes of one name", "two names that share assets"])
     def test_processes_that_write_at_once_never_break_what_is_there(
         self, what: str, scenes: tuple[Path, Path], out: Path, tmp_path: Path

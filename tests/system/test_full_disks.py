@@ -137,6 +137,7 @@ def judged(found: tuple[int, str, str, str], verb: str, reason: str) -> None:
     )
 
 
+@pytest.mark.slow_but("convert", "batch", "render", "plan", "translate")
 @some_verbs
 def test_a_full_disk_is_said_and_what_was_there_stays(verb: str, inputs: Path, full_disk: Path) -> None:
     before = filled(full_disk, VERBS[verb][1], inputs)

@@ -209,6 +209,7 @@ def assert_same_verdicts(path: Path, options: dict[str, Any], folder: Path) -> N
     assert checked
 
 
+@pytest.mark.slow_but("seed", "xml-arm", "two-robots", "closed-chain")
 @pytest.mark.parametrize("name", MODEL_FILES)
 def test_verdicts_on_the_models_stay(name: str, tmp_path: Path) -> None:
     path, options = model(name)

@@ -40,6 +40,7 @@ def children(word: str = "") -> list[int]:
     return found
 
 
+@pytest.mark.slow_but("ffmpeg")
 @needs_gl
 @pytest.mark.parametrize(
     ("ending", "victim", "error", "message"),

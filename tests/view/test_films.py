@@ -208,6 +208,7 @@ def run(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @needs_gl
 @needs_view
 def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> None:

@@ -59,6 +59,7 @@ def everything_is_in_view(scene: env2mjcf.Scene, q: np.ndarray | None) -> None:
         seen = segmentation(scene, q, size=size, camera=seen.camera, only=rest)
 
 
+@pytest.mark.slow_but("alpha", "seed", "maze.xml")
 @needs_gl
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_of_ours_is_in_view(name: str) -> None:

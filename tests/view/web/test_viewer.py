@@ -306,6 +306,7 @@ def view(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[
 SEED = MODELS / "seed" / "seed.env"
 
 
+@pytest.mark.slow_but("other.csv")
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
