@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -39,8 +40,19 @@ def free_cube(*obstacles: str, boundary: str = "Boundary Box [-10:10 ; -10:10 ; 
     return f"{boundary}\n\nMultibodies\n{1 + len(obstacles)}\n\nActive\n{active}{passive}"
 
 
-def without_privileges(folder: Path, call: Callable[[], object]) -> str:
-    """Return the code and message of the error that a call raises in a child that is not root, who may do anything."""
+def give_up_privileges() -> None:
+    """Let permissions hold for root, too, who may still read what is root's own: a checkout, a Python."""
+    if os.geteuid() == 0:
+        version_3_and_this_process = (ctypes.c_uint32 * 2)(0x20080522, 0)
+        if ctypes.CDLL(None).capset(version_3_and_this_process, (ctypes.c_uint32 * 6)()):
+            raise OSError("capabilities cannot be given up")
+
+
+def without_privileges(folder: Path, call: Callable[[], object], *, somebody_else: bool = False) -> str:
+    """Return the code and message of the error that a call raises in a child for which permissions hold.
+
+    With `somebody_else`, the child of root belongs to another user, who must be able to read what it imports.
+    """
     for above in (folder, *folder.parents):
         if above.stat().st_uid == os.getuid() and above != Path("/"):
             above.chmod(above.stat().st_mode | 0o055)
@@ -49,8 +61,9 @@ def without_privileges(folder: Path, call: Callable[[], object]) -> str:
     if child == 0:
         answer = "no error"
         try:
-            if os.getuid() == 0:
+            if somebody_else:
                 os.setuid(65534)
+            give_up_privileges()
             call()
         except Exception as error:  # whatever it is, the parent shows it
             answer = f"{getattr(error, 'code', type(error).__name__)} {error}"

@@ -327,7 +327,7 @@ def test_a_file_that_somebody_else_owns_stops_all_of_them(scene: Environment, ou
     (out / "new.env").write_text(OLDER["new.env"])
     out.chmod(0o1777)
     before = content(out)
-    found = without_privileges(out, lambda: write_environment(scene, out / "new.env"))
+    found = without_privileges(out, lambda: write_environment(scene, out / "new.env"), somebody_else=True)
     assert found.startswith("ENV179")
     assert "Operation not permitted" in found
     assert content(out) == before
