@@ -64,7 +64,7 @@ some_verbs = of_verbs(*VERBS)
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A scene, a way, a query and configurations; everybody may read them."""
+    """A scene, a way, a query and configurations."""
     folder = tmp_path_factory.mktemp("inputs")
     scene = env2mjcf.load(write_scene(folder, free_cube("0 4 0 0 0 0")), engine="mujoco")
     way = np.array([[-3.0, -3, 0, 0, 0, 0], [-3, 2, 0, 0, 0, 1], [-2, 2, 1, 0, 0, 1]])
@@ -72,9 +72,6 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "a.query").write_text("0 -3 -3 0 0 0 0\n0 3 -2 0 0 0 0\n")
     write_scene(folder / "other", free_cube("bar.g 4 0 0 0 0 0"), bar=box_mesh(0.1, 0.2, 2.0))
     np.save(folder / "q.npy", scene.space.sample(20_000, seed=0))
-    for above in (folder, *folder.parents):
-        if above.stat().st_uid == os.getuid() and above != Path("/"):
-            above.chmod(above.stat().st_mode | 0o055)
     return folder
 
 
