@@ -168,6 +168,8 @@ CATALOGUE: dict[str, str] = {
     "GEO242": "Vertices lay on edges of other faces (T-junctions); those faces were cut there.",
     "GEO243": "A mesh without inside collides as a surface, though it was to be solid.",
     "GEO244": "Flat parts of a closed mesh were folded over themselves; they were triangulated anew.",
+    "GEO245": "Closed pieces of a moving body overlap, or lie in each other; the mass is that of their union.",
+    "GEO246": "Closed pieces of a moving body overlap, and what they share counts twice in the mass.",
     "GEO250": "The inertia of a body was not computed from its volume alone.",
     "GEO251": "A scene is so large or small that its unit is hardly the metre.",
     "GEO252": "A body lies too far from the origin to be computed with.",

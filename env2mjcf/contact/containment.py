@@ -21,7 +21,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Probe:
-    """A pair in which `outer` is a closed solid that only its surface stands for."""
+    """A pair in which `outer` has closed pieces that only their surfaces stand for."""
 
     pair: int
     outer: str
@@ -72,7 +72,7 @@ class Containment:
         world = np.einsum("nij,cj->nci", inner[:, :3, :3], probe.points) + inner[:, None, :3, 3]
         local = np.einsum("nji,ncj->nci", outer[:, :3, :3], world - outer[:, None, :3, 3])
         analysis = self._parts[probe.outer].analysis
-        return encloses_any(analysis.vertices, analysis.faces, local)
+        return encloses_any(analysis.vertices, analysis.enclosing, local)
 
 
 class BoundaryTest:

@@ -23,8 +23,9 @@ class Surface:
 
     Attributes:
         triangles: (m, 3, 3) in the frame of the mesh.
-        solid: Whether a body inside it counts as touching.
-        outward: Whether it is solid and its normals are known to point outwards.
+        enclosing: (k,) rows of those of closed pieces, whose inside counts as touching; none where no inside does.
+        outward: Whether all of it is solid and its normals are known to point outwards.
+        alike: Whether the enclosing ones are wound alike, so that their winding number tells inside from outside.
         convex: Whether it is the boundary of its hull.
         box: The box that it is, if it is one.
         points: (c, 3) one corner of each component.
@@ -34,14 +35,20 @@ class Surface:
     """
 
     triangles: Floats
-    solid: bool
+    enclosing: Ints
     outward: bool
+    alike: bool
     convex: bool
     box: Box | None
     points: Floats
     corners: Floats
     edges: Floats
     normals: Floats
+
+    @property
+    def solid(self) -> bool:
+        """Whether a body inside it, or inside a piece of it, counts as touching."""
+        return len(self.enclosing) > 0
 
 
 class Surfaces:
@@ -93,8 +100,8 @@ class Surfaces:
 
 def _inside(solid: Surface, points: Floats) -> Bools:
     """Return whether any of each row's points, (n, c, 3), is in a solid, (n,)."""
-    faces = np.arange(3 * len(solid.triangles)).reshape(-1, 3)
-    return encloses_any(solid.triangles.reshape(-1, 3), faces, points)
+    triangles = solid.triangles[solid.enclosing]
+    return encloses_any(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), points)
 
 
 def _surface(part: Part, collision: Collision) -> Surface:
@@ -103,15 +110,20 @@ def _surface(part: Part, collision: Collision) -> Surface:
     if collision in ("hull", "coacd") and not analysis.convex:
         # What collides is not the mesh but these hulls.
         hulls = [hull_triangles(p.vertices + p.center) for p in shape.pieces]
-        return _made(np.concatenate(hulls), True, True, len(hulls) == 1, None, np.array([h[0, 0] for h in hulls]))
+        triangles, points = np.concatenate(hulls), np.array([h[0, 0] for h in hulls])
+        return _made(triangles, np.arange(len(triangles)), True, True, len(hulls) == 1, None, points)
     triangles = analysis.vertices[analysis.faces]
     first = np.unique(analysis.component, return_index=True)[1]
     inside = collision != "surface"
-    solid, outward = analysis.closed and inside, analysis.solid and inside
-    return _made(triangles, solid, outward, analysis.convex, analysis.box, triangles[first, 0])
+    enclosing = np.flatnonzero(analysis.closed_components[analysis.component] & inside)
+    alike = bool(analysis.solids[analysis.closed_components].all())
+    outward = analysis.solid and inside
+    return _made(triangles, enclosing, outward, alike, analysis.convex, analysis.box, triangles[first, 0])
 
 
-def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, box: Box | None, points: Floats) -> Surface:
+def _made(
+    triangles: Floats, enclosing: Ints, outward: bool, alike: bool, convex: bool, box: Box | None, points: Floats
+) -> Surface:
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
     along = unit(along[(along != 0).any(axis=1)])
@@ -119,7 +131,8 @@ def _made(triangles: Floats, solid: bool, outward: bool, convex: bool, box: Box 
     largest = np.argmax(np.abs(along), axis=1)
     along *= np.sign(np.take_along_axis(along, largest[:, None], axis=1))
     edges = along[np.unique(np.round(along, 9), axis=0, return_index=True)[1]]
-    return Surface(triangles, solid, outward, convex, box, points, corners, edges, unit_normals(triangles))
+    normals = unit_normals(triangles)
+    return Surface(triangles, enclosing, outward, alike, convex, box, points, corners, edges, normals)
 
 
 def unit_normals(triangles: Floats) -> Floats:

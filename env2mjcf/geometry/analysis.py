@@ -9,10 +9,11 @@ import numpy as np
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
 from ..limits import Work
+from .components import cleaned
 from .convexity import Box, exact_box, is_convex
 from .mesh import Mesh
 from .orientation import disagreeing, inside_out, wound_alike
-from .topology import RELATIVE_TOLERANCE, Floats, Ints, cleaned, face_areas, face_components, face_volumes
+from .topology import RELATIVE_TOLERANCE, Bools, Floats, Ints, apart, edges, face_areas, face_volumes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,26 +22,28 @@ class Analysis:
 
     Attributes:
         vertices: (n, 3) read-only; the file's vertices after welding, only those that `faces` use.
-        faces: (m, 3) read-only; without degenerate and duplicate ones, and of a `solid` mesh all counter-clockwise
-            from outside.
+        faces: (m, 3) read-only; without degenerate and duplicate ones, and of `solids` all counter-clockwise from
+            outside.
         source: (m,) row of each face in the mesh's own face list.
-        component: (m,) component of each face.
-        component_volumes: (c,) signed volumes of the components, wound as in `faces`; negative: a cavity.
+        component: (m,) piece of each face: what hangs together, see `components.cleaned`.
+        component_volumes: (c,) signed volumes of the pieces, wound as in `faces`; negative: a cavity. Without meaning
+            for those that are not `solids`.
+        closed_components: (c,) which pieces are closed: each edge borders an even number of the piece's triangles.
+        solids: (c,) which of these are wound so that `faces` tells inside from outside.
         diagonal: Of the bounding box of the vertices that the file's faces use.
         dimension: Of the point set within the tolerance: 0 a point, 1 a line, 2 flat, 3.
         normal: (3,) unit normal of the plane that the points are nearest to.
-        closed: Each edge borders an even number of triangles, and the surface is not flat.
-        consistent: In the file each edge is walked equally often both ways, as far as it has two faces.
+        consistent: In the file each edge of a piece is walked equally often both ways, as far as it has two faces.
         oriented: The same for `faces`, which are turned round to agree, where that is possible.
         inverted: Closed and consistent, and wound inside out in the file, at least in part.
         convex: Closed, one component, and the boundary of its own hull.
         box: The box that it is, if it is convex and exactly that.
         area: Of `faces`.
-        signed_volume: As wound in the file, if that is consistent; without meaning unless the mesh is closed.
+        signed_volume: Of the closed pieces as wound in the file, if that is consistent.
         degenerate_faces: Faces of no height that were dropped.
         duplicate_faces: Copies of other faces that were dropped.
         unused_vertices: Vertices of the file that no face uses.
-        open_edges: Edges with an odd number of faces.
+        open_edges: Edges with an odd number of a piece's faces.
         crowded_edges: Edges with more than two faces.
     """
 
@@ -49,10 +52,11 @@ class Analysis:
     source: Ints
     component: Ints
     component_volumes: Floats
+    closed_components: Bools
+    solids: Bools
     diagonal: float
     dimension: int
     normal: Floats
-    closed: bool
     consistent: bool
     oriented: bool
     inverted: bool
@@ -68,7 +72,7 @@ class Analysis:
 
     @property
     def components(self) -> int:
-        """Number of face components over welded edges."""
+        """Number of pieces."""
         return len(self.component_volumes)
 
     @property
@@ -77,14 +81,24 @@ class Analysis:
         return self.dimension == 2
 
     @property
+    def closed(self) -> bool:
+        """Every piece is closed."""
+        return self.components > 0 and bool(self.closed_components.all())
+
+    @property
     def solid(self) -> bool:
-        """Closed, and wound so that `faces` tells inside from outside."""
-        return self.closed and self.oriented
+        """Every piece is closed, and wound so that `faces` tells inside from outside."""
+        return self.components > 0 and bool(self.solids.all())
+
+    @property
+    def enclosing(self) -> Ints:
+        """The faces of closed pieces, (k, 3): what tells inside from outside."""
+        return self.faces if self.closed else self.faces[self.closed_components[self.component]]
 
     @property
     def volume(self) -> float:
-        """Enclosed volume; 0 unless `solid`. Components that overlap count once each."""
-        return float(self.component_volumes.sum()) if self.solid else 0.0
+        """Volume that `solids` enclose; those that overlap count once each."""
+        return float(self.component_volumes[self.solids].sum())
 
     @property
     def tolerance(self) -> float:
@@ -103,30 +117,28 @@ def analyse(mesh: Mesh, work: Work | None = None) -> Analysis:
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     tolerance = RELATIVE_TOLERANCE * diagonal
     dimension, normal = _dimension(points, tolerance)
-    clean = cleaned(points, np.searchsorted(used, mesh.faces), tolerance, dimension)
-    faces, turned = clean.faces, np.zeros(len(clean.faces), dtype=np.bool_)
-    consistent = oriented = wound_alike(clean.deciding)
-    if not consistent:
-        wrong = disagreeing(clean.edges)
-        oriented = wrong is not None
-        if wrong is not None:
-            turned, faces = wrong, np.where(wrong[:, None], faces[:, ::-1], faces)
+    clean = cleaned(points, np.searchsorted(used, mesh.faces), tolerance, dimension, work)
+    faces, component, count = clean.faces, clean.component, len(clean.closed)
+    alike = wound_alike(clean.deciding, clean.deciding_component, count)
+    turned, oriented = np.zeros(len(faces), dtype=np.bool_), alike
+    if not alike.all():
+        turned, agree = disagreeing(clean.edges, component, count)
+        oriented = alike | agree
+        turned &= (agree & ~alike)[component]
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
 
-    component = face_components(clean.edges)
-    volumes = np.bincount(component, face_volumes(points, faces) / 6.0).astype(np.float64)
-    signed_volume = float(volumes.sum())
-    if clean.closed and oriented:
-        flipped = inside_out(points, faces, component, volumes, work or Work())
-    else:
-        flipped = np.zeros(len(volumes), dtype=np.bool_)
+    volumes = np.bincount(component, face_volumes(points, faces) / 6.0, minlength=count).astype(np.float64)
+    signed_volume = float(volumes[clean.closed].sum())
+    solids = clean.closed & oriented
+    flipped = _inside_out(points, faces, component, volumes, solids, work or Work())
     turned = turned ^ flipped[component]
     faces = np.where(flipped[component, None], faces[:, ::-1], faces)
     volumes = np.where(flipped, -volumes, volumes)
     left, faces = np.unique(faces, return_inverse=True)
     vertices, faces = points[left], faces.reshape(-1, 3).astype(np.int64)
-    single = clean.closed and len(volumes) == 1
+    single = count == 1 and bool(clean.closed[0])
     convex = single and is_convex(vertices, faces, tolerance, clean.edges.turned(turned))
-    for array in (vertices, faces, clean.source, component, volumes, normal):
+    for array in (vertices, faces, clean.source, component, volumes, clean.closed, solids, normal):
         array.setflags(write=False)
     return Analysis(
         vertices=vertices,
@@ -134,13 +146,14 @@ def analyse(mesh: Mesh, work: Work | None = None) -> Analysis:
         source=clean.source,
         component=component,
         component_volumes=volumes,
+        closed_components=clean.closed,
+        solids=solids,
         diagonal=diagonal,
         dimension=dimension if len(faces) else min(dimension, 1),
         normal=normal,
-        closed=clean.closed,
-        consistent=consistent,
-        oriented=oriented,
-        inverted=consistent and bool(flipped.any()),
+        consistent=bool(alike.all()),
+        oriented=bool(oriented.all()),
+        inverted=bool((flipped & alike).any()),
         convex=convex,
         box=exact_box(vertices, faces, tolerance) if convex else None,
         area=float(face_areas(vertices, faces).sum()),
@@ -149,8 +162,19 @@ def analyse(mesh: Mesh, work: Work | None = None) -> Analysis:
         duplicate_faces=clean.duplicates,
         unused_vertices=len(mesh.vertices) - len(used),
         open_edges=int((clean.deciding.faces % 2 == 1).sum()),
-        crowded_edges=int((clean.deciding.faces > 2).sum()),
+        crowded_edges=clean.crowded,
     )
+
+
+def _inside_out(points: Floats, faces: Ints, component: Ints, volumes: Floats, solids: Bools, work: Work) -> Bools:
+    """Tell which components are inside out, (c,): an open one neither is a cavity nor holds one."""
+    if solids.all():
+        return inside_out(points, faces, component, volumes, work)
+    out, chosen = np.zeros(len(solids), dtype=np.bool_), solids[component]
+    if chosen.any():
+        number = (np.cumsum(solids) - 1)[component[chosen]]
+        out[solids] = inside_out(points, faces[chosen], number, volumes[solids], work)
+    return out
 
 
 def _dimension(points: Floats, tolerance: float) -> tuple[int, Floats]:
@@ -189,8 +213,7 @@ def mesh_diagnostics(
     if analysis.flat:
         warn("GEO230", "all points lie in one plane: the mesh is a sheet without inside", "it collides as a thin plate")
     elif not analysis.closed:
-        message = f"the surface is open: {analysis.open_edges} edges border an odd number of triangles"
-        warn("GEO232", message, "it collides as a sheet: a body wholly inside it does not count as touching")
+        warn("GEO232", _open_message(analysis), "it collides as a sheet: a body wholly inside it does not count as touching")
     # A sheet has no outside, so that its winding says nothing.
     if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
@@ -200,9 +223,27 @@ def mesh_diagnostics(
     if analysis.crowded_edges:
         note("GEO239", f"{analysis.crowded_edges} edges have more than two faces")
     if analysis.components > 1:
-        note("GEO237", f"the mesh is in {analysis.components} pieces")
+        kinds = "" if analysis.flat else f", {int(analysis.closed_components.sum())} of them closed"
+        note("GEO237", f"the mesh is in {analysis.components} pieces{kinds}")
     if analysis.unused_vertices:
         note("GEO238", f"{analysis.unused_vertices} vertices are used by no face")
+
+
+def _open_message(analysis: Analysis) -> str:
+    """Say how much of a surface is open, and where."""
+    count = int((~analysis.closed_components).sum())
+    whole = "the surface is open"
+    if analysis.components > 1:
+        whole = f"{count} of {analysis.components} pieces {'is' if count == 1 else 'are'} open"
+    loose = ~analysis.closed_components[analysis.component]
+    table = edges(apart(analysis.faces[loose], analysis.component[loose]))
+    corner = np.flatnonzero((table.faces % 2 == 1)[table.of_corner].ravel())
+    where = ""
+    if len(corner):
+        face, k = divmod(int(corner[0]), 3)
+        middle = analysis.vertices[analysis.faces[loose][face, [k, (k + 1) % 3]]].mean(axis=0)
+        where = ", one of them at ({:.6g}, {:.6g}, {:.6g}) of the body's frame".format(*middle)
+    return f"{whole}: {analysis.open_edges} edges border an odd number of triangles{where}"
 
 
 def refuse_without_area(analysis: Analysis, log: DiagnosticLog, subject: str, span: Span | None = None) -> None:

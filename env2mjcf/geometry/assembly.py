@@ -23,6 +23,7 @@ from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CollisionShape, collision_shape
 from .store import GeometryCache, default_folder
+from .union import Union, union, union_diagnostics
 
 # Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles.
 _THICKNESS_PER_EXTENT = 5e-6
@@ -194,6 +195,7 @@ class _Meshes:
         self._raw: dict[Path, Mesh] = {}
         self._meshes: dict[tuple[Path, Recentring], Mesh] = {}
         self._analyses: dict[Mesh, tuple[Analysis, Work]] = {}
+        self._unions: dict[Mesh, Union] = {}
         self._shapes: dict[Mesh, tuple[CollisionShape, Certificate]] = {}
         self._elements = 0
         self._cells = 0
@@ -227,10 +229,18 @@ class _Meshes:
             shape, proof = self._shapes[mesh]
             self._cells += len(shape.pieces)
             self._at_most("scene_cells", self._cells, "GEO272", "convex pieces", body)
-        inertia = inertial(mesh, analysis, options.density, body.mass) if moves else None
+        inertia = inertial(mesh, analysis, options.density, body.mass, self._union(mesh, body)) if moves else None
         if inertia is not None and inertia.note:
             self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
         return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia, proof)
+
+    def _union(self, mesh: Mesh, body: Body) -> Union:
+        """Return what a moving body's mesh fills."""
+        if mesh not in self._unions:
+            with bounded(self._options.limits, self._log, body.filename, body.span):
+                self._unions[mesh] = union(*self._analyses[mesh])
+            union_diagnostics(self._unions[mesh], self._log, body.filename, body.span)
+        return self._unions[mesh]
 
     def _at_most(self, limit: str, count: int, code: str, what: str, body: Body) -> None:
         most = getattr(self._options.limits, limit)

@@ -109,11 +109,11 @@ def certify(shape: CollisionShape, thickness: float) -> Certificate:
         thickness: That it was made with.
     """
     analysis = shape.analysis
-    # As `auto` makes them: each component is convex and has a hull of its own.
+    # As `auto` makes them: each piece is convex and has a hull of its own.
     parts = shape.strategy == "hull" and len(shape.pieces) == analysis.components > 1
     if shape.strategy not in APPROXIMATE or analysis.convex or parts:
         surface = shape.strategy == "surface" and not shape.needs_containment
-        lost = analysis.volume if surface and analysis.solid else 0.0
+        lost = analysis.volume if surface else 0.0
         return Certificate(True, 0.0, lost, thickness, thickness, thickness, 0, 0.0, 0.0, 1.0 if lost else 0.0)
     return _measured(shape, thickness)
 
@@ -170,7 +170,7 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
         reach_lost = _reach(under, distances(under, pieces.vertices, pieces.faces), pieces.inside)
         samples, gap = samples + len(on_mesh), max(gap, gap_mesh)
     volume = analysis.volume if analysis.components == 1 else float(owned.sum() * cell)
-    solid = analysis.solid and volume > 0
+    solid = analysis.volume > 0 and volume > 0
     # MuJoCo keeps corners as float32, which cannot tell less than this from nothing.
     reach_added, reach_lost = (r if r > 1e-6 * analysis.diagonal else 0.0 for r in (reach_added, reach_lost))
     return Certificate(
@@ -201,9 +201,7 @@ def _lattice(first: Floats, second: Floats, triangles: int) -> tuple[Floats, flo
 
 def _in_solid(points: Floats, shape: CollisionShape) -> Bools:
     analysis = shape.analysis
-    if not analysis.solid:
-        return np.zeros(len(points), dtype=np.bool_)
-    return encloses(analysis.vertices, analysis.faces, points)
+    return encloses(analysis.vertices, analysis.faces[analysis.solids[analysis.component]], points)
 
 
 def _reach(points: Floats, apart: Floats, inside: Callable[[Floats], Bools]) -> float:

@@ -47,7 +47,7 @@ def unfolded(analysis: Analysis) -> Unfolded | None:
     point changes, because the new faces have the same signed boundary and lie in the same plane.
 
     Args:
-        analysis: Of a `solid` mesh.
+        analysis: The mesh; only its `solids` are changed.
     """
     vertices, faces = analysis.vertices, analysis.faces
     areas = area_vectors(vertices[faces])
@@ -77,6 +77,8 @@ def _folded_patches(analysis: Analysis, normals: Floats) -> list[Ints]:
     """Return the faces of each connected flat patch in which neighbours have opposite normals."""
     vertices, faces = analysis.vertices, analysis.faces
     here, there, _, cosine = flat_neighbours(vertices, faces, edges(faces), normals, analysis.tolerance)
+    solid = analysis.solids[analysis.component[here // 3]] & analysis.solids[analysis.component[there // 3]]
+    here, there, cosine = here[solid], there[solid], cosine[solid]
     label = connected(len(normals), here // 3, there // 3)
     return [np.flatnonzero(label == p) for p in np.unique(label[here[cosine < 0] // 3]).tolist()]
 

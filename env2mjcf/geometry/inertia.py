@@ -7,10 +7,12 @@ from math import copysign, hypot
 
 import numpy as np
 
+from ..errors import counted
 from ..transforms import quaternion_from_matrix
 from .analysis import Analysis
 from .mesh import Mesh
 from .topology import RELATIVE_TOLERANCE, Floats, area_vectors
+from .union import Union, union
 
 SHELL_THICKNESS = 0.01
 """Thickness of the sheet that stands for a mesh without inside, in units of its diagonal."""
@@ -41,25 +43,34 @@ class Inertial:
     note: str
 
 
-def inertial(mesh: Mesh, analysis: Analysis, density: float, mass: float | None = None) -> Inertial:
+def inertial(
+    mesh: Mesh, analysis: Analysis, density: float, mass: float | None = None, filled: Union | None = None
+) -> Inertial:
     """Return the inertia of a mesh of uniform density.
 
-    A solid has the exact moments of its polyhedron; any other mesh those of a sheet of 1 % of its diagonal.
+    Solid pieces have the exact moments of their polyhedra; all others those of a sheet of 1 % of the mesh's diagonal.
 
     Args:
         mesh: The mesh; its name appears in the note.
         analysis: `analyse(mesh)`.
         density: Mass per volume.
         mass: Mass that the file gives; overrides the density if it is positive.
+        filled: `union(analysis)`, where it is known.
     """
     notes: list[str] = []
     origin = analysis.vertices.mean(axis=0) if len(analysis.vertices) else np.zeros(3)
-    if analysis.solid and analysis.volume > RELATIVE_TOLERANCE * analysis.area * analysis.diagonal:
-        volume, com, second = _solid(analysis.vertices[analysis.faces] - origin)
-    else:
-        thickness = SHELL_THICKNESS * analysis.diagonal
-        volume, com, second = _sheet(analysis.vertices[analysis.faces] - origin, thickness)
-        notes.append(f"{mesh.name} encloses no certain volume, so it was taken for a sheet {thickness:.3g} thick")
+    thickness = SHELL_THICKNESS * analysis.diagonal
+    filled = filled or union(analysis)
+    loose = np.ones(len(analysis.faces), dtype=np.bool_)
+    parts: list[tuple[float, Floats, Floats]] = []
+    if filled.volume > RELATIVE_TOLERANCE * analysis.area * analysis.diagonal:
+        parts.append(_solid(filled.triangles - origin))
+        loose = ~analysis.solids[analysis.component]
+    if loose.any() or not parts:
+        parts.append(_sheet(analysis.vertices[analysis.faces[loose]] - origin, thickness))
+        what = mesh.name if loose.all() else f"a part of {mesh.name} in {counted(int(loose.sum()), 'triangle')}"
+        notes.append(f"{what} encloses no certain volume, so it was taken for a sheet {thickness:.3g} thick")
+    volume, com, second = parts[0] if len(parts) == 1 else _together(*parts)
     total = volume * density
     if mass is not None and mass > 0:
         total = float(mass)
@@ -95,6 +106,14 @@ def _solid(triangles: Floats) -> tuple[float, Floats, Floats]:
     com = volumes @ sums / (4 * volume)
     second = np.einsum("m,mki,mkj->ij", volumes, triangles, triangles) + np.einsum("m,mi,mj->ij", volumes, sums, sums)
     return volume, com, second / 20 - volume * np.outer(com, com)
+
+
+def _together(*parts: tuple[float, Floats, Floats]) -> tuple[float, Floats, Floats]:
+    """Return volume, centroid and central second moments of several bodies."""
+    volume = sum(v for v, _, _ in parts)
+    com = np.sum([v * c for v, c, _ in parts], axis=0) / volume
+    second = np.sum([s + v * np.outer(c - com, c - com) for v, c, s in parts], axis=0)
+    return volume, com, second
 
 
 def _sheet(triangles: Floats, thickness: float) -> tuple[float, Floats, Floats]:

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..limits import Work
 from .topology import Bools, Edges, Floats, Ints, by_component, connected
 
 _BLOCK = 2_000_000  # solid angles held in memory at once
+_PROBES = 8  # faces of a surface that are looked at until one is clearly inside or outside of another
 
 
-def wound_alike(table: Edges) -> bool:
-    """Tell whether each edge is walked as often one way as the other, but for the odd face at an open edge."""
-    return bool((np.abs(table.balance) <= table.faces % 2).all())
+def wound_alike(table: Edges, component: Ints, count: int) -> Bools:
+    """Tell of which components each edge is walked as often one way as the other, but for an odd face, (count,)."""
+    out = np.ones(count, dtype=np.bool_)
+    wrong = np.abs(table.balance) > table.faces % 2
+    out[component[wrong[table.of_corner].any(axis=1)]] = False
+    return out
 
 
-def disagreeing(table: Edges) -> Bools | None:
-    """Return which faces to turn round so that neighbours agree, (m,); None where no winding makes all edges agree.
+def disagreeing(table: Edges, component: Ints, count: int) -> tuple[Bools, Bools]:
+    """Find the faces to turn round so that neighbours agree.
 
     In each patch the winding of the majority wins.
+
+    Returns:
+        Which faces, (m,), and in which components all edges agree then, (count,).
     """
     here, there, edge = table.neighbours()
     pair = table.faces[edge] == 2
@@ -32,7 +41,7 @@ def disagreeing(table: Edges) -> Bools | None:
         known[b[step]] = True
     minority = np.bincount(patch, turned) * 2 <= np.bincount(patch)
     turned = turned == minority[patch]
-    return turned if wound_alike(table.turned(turned)) else None
+    return turned, wound_alike(table.turned(turned), component, count)
 
 
 def winding_numbers(points: Floats, vertices: Floats, faces: Ints, work: Work | None = None) -> Floats:
@@ -91,14 +100,27 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, 
     groups = by_component(faces, component)
     low = np.array([vertices[g.ravel()].min(axis=0) for g in groups])
     high = np.array([vertices[g.ravel()].max(axis=0) for g in groups])
-    # The middle of a face stays clear of edges that components may share.
-    probes = np.array([vertices[g[0]].mean(axis=0) for g in groups])
     for i in np.flatnonzero(volumes < 0):
         work.spend(len(groups))
         around = np.flatnonzero((low <= low[i]).all(axis=1) & (high >= high[i]).all(axis=1))
-        if any(encloses(vertices, groups[j], probes[i : i + 1], work)[0] for j in around if j != i):
+        if any(_within(vertices, groups[j], groups[i : i + 1], work)[0] for j in around if j != i):
             continue
         within = np.flatnonzero((low >= low[i]).all(axis=1) & (high <= high[i]).all(axis=1))
-        flipped[within[encloses(vertices, groups[i], probes[within], work)]] = True
+        flipped[within[_within(vertices, groups[i], [groups[j] for j in within], work)]] = True
         flipped[i] = True
     return flipped
+
+
+def _within(vertices: Floats, outer: Ints, inner: Sequence[Ints], work: Work) -> Bools:
+    """Tell which surfaces a closed one winds around, given that they do not cross, (len(inner),)."""
+    out = np.zeros(len(inner), dtype=np.bool_)
+    unsure = np.arange(len(inner))
+    for nth in range(_PROBES):
+        # The middle of a face stays clear of edges that surfaces may share; of two that share a wall, it may lie in it.
+        probes = np.array([vertices[inner[i][nth * len(inner[i]) // _PROBES]].mean(axis=0) for i in unsure])
+        around = np.abs(winding_numbers(probes.reshape(-1, 3), vertices, outer, work))
+        out[unsure] = around > 0.5
+        unsure = unsure[np.abs(around - 0.5) < 0.25]
+        if not len(unsure):
+            break
+    return out

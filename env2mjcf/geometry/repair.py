@@ -56,16 +56,20 @@ def repaired(mesh: Mesh, work: Work | None = None) -> Repaired:
 
 def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
     before = analyse(mesh, work)
-    open_before = _open_edges(before.faces)
+    # What is closed by itself stays as it is, whatever touches it.
+    loose = ~before.closed_components[before.component]
+    source, shut = np.flatnonzero(loose), np.flatnonzero(~loose)
+    faces = before.faces[source]
+    open_before = _open_edges(faces)
     if before.dimension < 3 or not open_before:
         return Repaired(before)
-    faces, source = before.faces, np.arange(len(before.faces))
     for _ in range(_PASSES):
         faces, source, found = _cut(before.vertices, faces, source, before.tolerance, work)
         if not found:
             break
     if _open_edges(faces) >= open_before:
         return Repaired(before)
+    faces, source = np.concatenate([before.faces[shut], faces]), np.concatenate([shut, source])
     after = _again(mesh, before, faces, source, work)
     return Repaired(after, int((np.bincount(source) > 1).sum()), open_before)
 
@@ -73,7 +77,7 @@ def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
 def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
     before = result.analysis
     # A convex mesh collides as its hull, whatever its faces are.
-    new = unfolded(before) if before.solid and not before.convex else None
+    new = unfolded(before) if before.solids.any() and not before.convex else None
     if new is None:
         return result
     # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
@@ -85,14 +89,26 @@ def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
         crowded_edges=before.crowded_edges,
     )
     noise = before.tolerance * before.area
-    if not after.solid or len(after.faces) != len(new.faces) or abs(after.volume - before.volume) > noise:
+    open_faces = [int((~a.solids[a.component]).sum()) for a in (before, after)]
+    same = open_faces[0] == open_faces[1] and len(after.faces) == len(new.faces)
+    if not same or abs(after.volume - before.volume) > noise:
         return result
     return replace(result, analysis=after, folded_faces=new.rebuilt, sheets=new.sheets)
 
 
 def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work) -> Analysis:
-    """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up."""
-    after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path), work)
+    """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up.
+
+    Each closed piece gets vertices of its own, so that it is told again from what touches it.
+    """
+    shut = before.closed_components[before.component]
+    group = np.where(shut, before.component + 1, 0)[source]
+    places, faces = np.unique(faces * (before.components + 1) + group[:, None], return_inverse=True)
+    vertex = places // (before.components + 1)
+    again = np.concatenate([np.zeros(1, dtype=np.bool_), vertex[1:] == vertex[:-1]])[: len(vertex)]
+    number = np.where(again, len(before.vertices) + np.cumsum(again) - 1, vertex)
+    vertices = np.concatenate([before.vertices, before.vertices[vertex[again]]])
+    after = analyse(Mesh.from_arrays(mesh.name, vertices, number[faces.reshape(-1, 3)], mesh.path), work)
     return replace(
         after,
         source=before.source[source[after.source]],

@@ -32,8 +32,8 @@ class CollisionShape:
 
     Attributes:
         mesh: The mesh.
-        strategy: What was applied: "hull"; "coacd"; "solid" if any part is lined with shell cells; "surface" if any
-            part is collided as a surface.
+        strategy: What was applied: "hull"; "coacd"; "surface" if all of it is collided as a surface; "solid" if any
+            part is lined with shell cells, or solids and surfaces stand side by side.
         pieces: Convex pieces whose union collides.
         needs_containment: The pieces do not fill some closed part, whose inside counts as collision: the caller must
             test that separately.
@@ -123,7 +123,7 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
     if analysis.flat:
         return "flat: one thin plate, the convex hull of its outline"
     claimed = hull_volume(piece.vertices)
-    if not analysis.solid or analysis.volume <= 0:
+    if analysis.volume <= 0:
         return f"one hull of volume {claimed:.6g} about a surface that encloses nothing for certain"
     # Overlapping components count twice in the mesh's volume, so the hull may seem to claim less.
     extra = max(0.0, claimed / analysis.volume - 1)
@@ -131,13 +131,23 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
 
 
 def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
-    faces = analysis.faces
-    polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
-    pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
-    made = {id(piece.polygon) for piece in pieces}
-    omitted = _area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made])
-    note = f"{counted(len(faces), 'triangle')} in {counted(len(pieces), 'prism')}"
+    pieces, omitted = _prisms(analysis, np.ones(analysis.components, dtype=np.bool_), thickness)
+    note = f"{counted(len(analysis.faces), 'triangle')} in {counted(len(pieces), 'prism')}"
     return CollisionShape(mesh, "surface", pieces, False, analysis, note, omitted)
+
+
+def _prisms(analysis: Analysis, chosen: Bools, thickness: float) -> tuple[tuple[ConvexPiece, ...], float]:
+    """Return prisms on the polygons of some components, (c,), those of solids inside of them; and the area left out."""
+    pieces: tuple[ConvexPiece, ...] = ()
+    omitted = 0.0
+    for inward in (True, False):
+        rows = np.flatnonzero((chosen & (analysis.solids == inward))[analysis.component])
+        polygons = convex_polygons(analysis.vertices, analysis.faces[rows], analysis.tolerance)
+        made = prisms(analysis.vertices, polygons, thickness, inward=inward)
+        kept = {id(piece.polygon) for piece in made}
+        omitted += _area(analysis, rows, [p for p in polygons if id(p) not in kept])
+        pieces += made
+    return pieces, omitted
 
 
 def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float:
@@ -153,23 +163,39 @@ def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
 def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     if analysis.convex:
         return _hull(mesh, analysis, thickness, work)
-    if not analysis.solid:
+    solids, closed = analysis.solids, analysis.closed_components
+    if not solids.any():
         shape = _surface(mesh, analysis, thickness, work)
-        why = "no winding tells its sides apart" if analysis.closed else "the mesh is open and has no inside"
-        return replace(shape, needs_containment=analysis.closed, note=f"{why}: {shape.note}")
+        why = "no winding tells its sides apart" if closed.any() else "the mesh is open and has no inside"
+        return replace(shape, needs_containment=bool(closed.any()), note=f"{why}: {shape.note}")
     whole = _convex_solids(analysis, work)
-    hulls = tuple(
+    pieces = tuple(
         hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
         for c in np.flatnonzero(whole)
     )
-    rest = np.flatnonzero(~whole[analysis.component])
-    if len(rest) == 0:
-        return CollisionShape(mesh, "hull", hulls, False, analysis, _hulled(hulls))
-    lining = shells(analysis, rest, thickness, work)
-    note = _shell_note(lining, analysis.component_volumes[~whole].sum())
-    note = f"{_hulled(hulls)}, {note}" if hulls else note
-    omitted = _area(analysis, rest, lining.missing)
-    return CollisionShape(mesh, "solid", hulls + lining.pieces, True, analysis, note, omitted)
+    notes = [_hulled(pieces)] if pieces else []
+    omitted = 0.0
+    rest = np.flatnonzero((solids & ~whole)[analysis.component])
+    if len(rest):
+        lining = shells(analysis, rest, thickness, work)
+        notes.append(_shell_note(lining, analysis.component_volumes[solids & ~whole].sum()))
+        omitted += _area(analysis, rest, lining.missing)
+        pieces += lining.pieces
+    if not solids.all():
+        sheets, left_out = _prisms(analysis, ~solids, thickness)
+        notes.append(_sheet_note(analysis, len(sheets)))
+        omitted += left_out
+        pieces += sheets
+    strategy = "hull" if whole.all() else "solid"
+    hollow = len(rest) > 0 or bool((closed & ~solids).any())
+    return CollisionShape(mesh, strategy, pieces, hollow, analysis, ", ".join(notes), omitted)
+
+
+def _sheet_note(analysis: Analysis, count: int) -> str:
+    sheets = int((~analysis.solids).sum())
+    triangles = int((~analysis.solids)[analysis.component].sum())
+    what = f"{counted(sheets, 'piece')} as {'a surface' if sheets == 1 else 'surfaces'}"
+    return f"{what}: {counted(triangles, 'triangle')} in {counted(count, 'prism')}"
 
 
 def _shell_note(lining: Shells, volume: float) -> str:
@@ -197,19 +223,18 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
 def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     """Tell which components are convex solids without a cavity in them, (c,).
 
-    A solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
+    The mesh's solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
     """
     out = np.zeros(analysis.components, dtype=np.bool_)
-    if not analysis.solid:
-        return out
     parts = [np.unique(g, return_inverse=True) for g in by_component(analysis.faces, analysis.component)]
     points = [analysis.vertices[used] for used, _ in parts]
     low, high = (np.array([f(p, axis=0) for p in points]) for f in (np.min, np.max))
     size = np.linalg.norm(high - low, axis=1)
     volumes = analysis.component_volumes
-    cavities = volumes <= RELATIVE_TOLERANCE * size**3
-    work.spend(int(cavities.sum()) * int((~cavities).sum()))
-    for c in np.flatnonzero(~cavities):
+    empty = volumes <= RELATIVE_TOLERANCE * size**3
+    cavities, solid = analysis.solids & empty, analysis.solids & ~empty
+    work.spend(int(cavities.sum()) * int(solid.sum()))
+    for c in np.flatnonzero(solid):
         if ((low[cavities] > high[c]) | (high[cavities] < low[c])).any(axis=1).all():
             faces = parts[c][1].reshape(-1, 3).astype(np.int64)
             out[c] = is_convex(points[c], faces, RELATIVE_TOLERANCE * size[c])

@@ -1,4 +1,4 @@
-"""How the triangles of a mesh hang together: welded points, shared edges, components, and the triangles that count."""
+"""How the triangles of a mesh hang together: welded points, shared edges, and what is linked by them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ Bools = NDArray[np.bool_]
 
 RELATIVE_TOLERANCE = 1e-9
 """What counts as nothing, in units of a mesh's diagonal: far below float32, far above the rounding of coordinates."""
+
+COINCIDENT = 1e-6
+"""Angle in radians below which two faces at an edge coincide: the solid that touches there is another one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +66,12 @@ def edges(faces: Ints) -> Edges:
     count = np.bincount(of_corner.ravel(), minlength=len(keys)).astype(np.int64)
     ends = np.stack(np.divmod(keys, span), axis=1)
     return Edges(ends, of_corner, forward, count, _balance(of_corner, forward, count))
+
+
+def apart(faces: Ints, component: Ints) -> Ints:
+    """Number the vertices of faces (m, 3) anew, so that no two components (m,) have one in common."""
+    span = int(faces.max(initial=0)) + 1
+    return np.unique(component[:, None] * span + faces, return_inverse=True)[1].reshape(-1, 3).astype(np.int64)
 
 
 def face_components(table: Edges) -> Ints:
@@ -149,90 +158,46 @@ def face_volumes(vertices: Floats, faces: Ints) -> Floats:
     return np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cleaned:
-    """Triangles without degenerate and duplicate ones.
+def facing(vertices: Floats, faces: Ints, table: Edges, normals: Floats) -> tuple[Ints, Ints, Floats, bool]:
+    """Find the face that bounds the same wedge of the solid as each face at each of its edges.
 
-    Attributes:
-        faces: (k, 3) indices into the given points, welded ones replaced by the first of their kind.
-        source: (k,) rows of the given faces.
-        edges: Of `faces`.
-        deciding: Edges of the faces that decide whether the surface is closed: `faces`, and perhaps some of no height.
-        closed: Each of the deciding edges has an even number of faces, and the points are not flat.
-        degenerate: Number of faces of no height.
-        duplicates: Number of copies that were dropped.
-    """
-
-    faces: Ints
-    source: Ints
-    edges: Edges
-    deciding: Edges
-    closed: bool
-    degenerate: int
-    duplicates: int
-
-
-def cleaned(points: Floats, faces: Ints, tolerance: float, dimension: int) -> Cleaned:
-    """Weld and clean triangles.
+    It is the first one of opposite direction that a rotation about the edge, from the face into the solid, finds.
 
     Args:
-        points: (n, 3).
-        faces: (m, 3) indices into `points`.
-        tolerance: Length that counts as nothing.
-        dimension: Of the point set; below 3 nothing is closed.
+        vertices: (n, 3).
+        faces: (m, 3) counter-clockwise from outside.
+        table: `edges(faces)`.
+        normals: (m, 3) unit normals.
+
+    Returns:
+        The corners of both from which the edge leads, and the angle of the wedge in radians, (p,) each; corners of
+        open edges, and of those that are walked one way only, are missing. And whether any faces lie upon each other at
+        an edge.
     """
-    faces = weld(points, tolerance)[faces].reshape(-1, 3)
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    high = _heights(points, faces) > tolerance
-    one, both = _without_copies(faces)
-    keep, deciding, closed = _choose(points, faces, (one & whole, both & whole), high, dimension)
-    source = np.flatnonzero(keep & high)
-    table = deciding if len(deciding.of_corner) == len(source) else edges(faces[source])
-    degenerate = int((~whole | (one & ~high)).sum())
-    return Cleaned(faces[source], source, table, deciding, closed, degenerate, int((whole & ~keep).sum()))
+    corner = np.argsort(table.of_corner.ravel(), kind="stable")
+    start = np.concatenate([[0], np.cumsum(table.faces)[:-1]]).astype(np.int64)
+    along = vertices[faces[:, (1, 2, 0)]] - vertices[faces]
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    inward = np.cross(normals[:, None], along)
+    here, there = _pairs_at_edges(table.faces, start, corner)
+    opposite = table.forward.ravel()[here] != table.forward.ravel()[there]
+    here, there = here[opposite], there[opposite]
+    normal, own, other = normals[here // 3], inward.reshape(-1, 3)[here], inward.reshape(-1, 3)[there]
+    angle = np.arctan2(-np.einsum("ij,ij->i", normal, other), np.einsum("ij,ij->i", own, other)) % (2 * np.pi)
+    angle[angle < COINCIDENT] = 2 * np.pi
+    order = np.lexsort((there, angle, here))
+    first = order[np.concatenate([[True], np.diff(here[order]) > 0])[: len(order)]]
+    return here[first], there[first], angle[first], bool((angle > 2 * np.pi - COINCIDENT).any())
 
 
-def _heights(points: Floats, faces: Ints) -> Floats:
-    """Return the smallest height of each face, (m,)."""
-    corners = points[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    return np.divide(2 * face_areas(points, faces), longest, out=np.zeros(len(faces)), where=longest > 0)
-
-
-def _without_copies(faces: Ints) -> tuple[Bools, Bools]:
-    """Return two masks (m,): one copy of each triangle, and one copy of each triangle and winding."""
-    corner = np.argsort(faces, axis=1)
-    turned = (np.diff(corner, axis=1) % 3 == 1).all(axis=1)
-    keys = np.sort(faces, axis=1)
-    one, both = np.zeros((2, len(faces)), dtype=np.bool_)
-    if len(faces):
-        one[np.unique(keys, axis=0, return_index=True)[1]] = True
-        both[np.unique(np.column_stack([keys, turned]), axis=0, return_index=True)[1]] = True
-    return one, both
-
-
-def _choose(
-    points: Floats, faces: Ints, masks: tuple[Bools, Bools], high: Bools, dimension: int
-) -> tuple[Bools, Edges, bool]:
-    """Pick the face set that closes the surface: which copies count, and whether faces of no height do.
-
-    A wall that two solids share is a pair of opposite copies: both must stay for its edges to be even (their
-    volumes cancel). A face of no height may bridge a T-junction: then it counts for the topology, though not as area.
-    """
-    one, both = masks
-    fallback: tuple[Bools, Edges] | None = None
-    for mask in (one, both) if (one != both).any() else (one,):
-        for counted in (mask & high, mask) if (mask & ~high).any() else (mask,):
-            table = edges(faces[counted])
-            fallback = fallback or (mask, table)
-            if dimension < 3 or not counted.any() or (table.faces % 2).any():
-                continue
-            if mask is both and abs(face_volumes(points, faces[counted]).sum()) <= _noise(points, faces[counted]):
-                continue  # a sheet with two sides encloses nothing
-            return mask, table, True
-    assert fallback is not None
-    return *fallback, False
-
-
-def _noise(points: Floats, faces: Ints) -> float:
-    return RELATIVE_TOLERANCE * float(face_areas(points, faces).sum() * np.linalg.norm(np.ptp(points, axis=0)))
+def _pairs_at_edges(count: Ints, start: Ints, corner: Ints) -> tuple[Ints, Ints]:
+    """Return all ordered pairs of different corners at one edge."""
+    here: list[Ints] = []
+    there: list[Ints] = []
+    for size in np.unique(count[count > 1]).tolist():
+        members = corner[start[count == size][:, None] + np.arange(size)]
+        a, b = np.nonzero(~np.eye(size, dtype=np.bool_))
+        here.append(members[:, a].ravel())
+        there.append(members[:, b].ravel())
+    empty = np.zeros(0, dtype=np.int64)
+    return np.concatenate([empty, *here]), np.concatenate([empty, *there])

@@ -96,12 +96,16 @@ class _Shapes:
         self._surfaces = surfaces
         count = len(surfaces.trees.roots)
         self._frames = [_frame(surfaces, k) for k in range(count)]
-        self.trees: list[WideTree] = []
-        self.points: list[Floats] = []
+        placed = [_into(self._frames[k], surfaces.surface(k).triangles) for k in range(count)]
+        self.points = [_into(self._frames[k], surfaces.surface(k).points) for k in range(count)]
+        # A tree over each shape; after them, one over the closed pieces of each that has open ones, too.
+        self.trees = [wide_tree(t) for t in placed]
+        self._enclosing = list(range(count))
         for k in range(count):
-            surface = surfaces.surface(k)
-            self.trees.append(wide_tree(_into(self._frames[k], surface.triangles)))
-            self.points.append(_into(self._frames[k], surface.points))
+            rows = surfaces.surface(k).enclosing
+            if 0 < len(rows) < len(placed[k]):
+                self._enclosing[k] = len(self.trees)
+                self.trees.append(wide_tree(placed[k][rows]))
         # Walks over two trees hold two numbers for each place, and at most one lane less than a node's on each level.
         deepest = max((depth(t.child) for t in self.trees), default=1)
         self.stack = 2 * LANES * (2 * deepest + 1)
@@ -127,16 +131,18 @@ class _Shapes:
         blocks = np.cumsum([0, *(len(t.blocks) for t in self.trees)])
         points = np.cumsum([0, *map(len, self.points)])
         children: list[Ints] = []
-        rows: list[tuple[int, ...]] = []
-        halves: list[tuple[float, ...]] = []
+        starts: list[int] = []
         for k, tree in enumerate(self.trees):
             child = np.where(tree.child > 0, tree.child + nodes[k], tree.child)
             children.append(np.where(tree.child < 0, tree.child - blocks[k], child))
-            surface = self._surfaces.surface(k)
-            kind = (int(surface.box is not None), surface.solid * (1 if surface.outward else 2))
             # The root has one lane, the whole, which is tested before walks begin; unless that is all there is.
-            start = nodes[k] + max(int(tree.child[0, 0]), 0)
-            rows.append((int(nodes[k]), int(start), *kind, int(points[k]), int(points[k + 1])))
+            starts.append(int(nodes[k] + max(int(tree.child[0, 0]), 0)))
+        rows: list[tuple[int, ...]] = []
+        halves: list[tuple[float, ...]] = []
+        for k, enclosing in enumerate(self._enclosing):
+            surface = self._surfaces.surface(k)
+            kind = (int(surface.box is not None), surface.solid * (1 if surface.alike else 2))
+            rows.append((int(nodes[k]), starts[k], *kind, int(points[k]), int(points[k + 1]), starts[enclosing]))
             # The least diagonal of a component's box, where it is known.
             size = float(np.linalg.norm(np.ptp(surface.corners, axis=0))) if len(surface.points) == 1 else 0.0
             halves.append((*self.box(k), size))

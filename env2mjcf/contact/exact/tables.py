@@ -17,7 +17,7 @@ BLOCK = 4
 
 # Columns of `Tables.links`, and of `Tables.shapes`.
 STEP, SHAPE, TOP, FIRST_VERTEX, LAST_VERTEX = 0, 1, 2, 3, 4
-ROOT, START, IS_BOX, IS_SOLID, FIRST_POINT, LAST_POINT = 0, 1, 2, 3, 4, 5
+ROOT, START, IS_BOX, IS_SOLID, FIRST_POINT, LAST_POINT, ENCLOSING = 0, 1, 2, 3, 4, 5, 6
 
 
 class Tables(NamedTuple):
@@ -27,8 +27,9 @@ class Tables(NamedTuple):
         steps: (s, 8) parent, motion and columns of the steps of kinematics.
         links: (l, 5) step, shape, root of the tree over the obstacles that the link is tested with, or -1; its first
             vertex and the one after the last.
-        shapes: (k, 6) root; where walks over its tree alone begin; is it a box; does its inside count: 0 not, 1
-            yes, 2 yes, though its triangles are not wound alike; its first component point and the one after the last.
+        shapes: (k, 7) root; where walks over its tree alone begin; is it a box; does its inside count: 0 not, 1
+            yes, 2 yes, though its triangles are not wound alike; its first component point and the one after the last;
+            where walks begin that look at the triangles of its closed pieces alone.
         children: (n, 8) of the nodes of the meshes' trees; see `WideTree`.
         obstacles: (o, 1) shape.
         top_children: (n, 8) of the trees over obstacles; a leaf is ~obstacle.
@@ -68,7 +69,7 @@ class Tables(NamedTuple):
     boundary: Any
 
 
-WIDTHS = (8, 5, 6, 8, 1, 8, 2, 3, 12, 4, 48, 36, 3, 12, 48, 2, 3, 3)
+WIDTHS = (8, 5, 7, 8, 1, 8, 2, 3, 12, 4, 48, 36, 3, 12, 48, 2, 3, 3)
 """Columns of each table."""
 
 INTEGERS = 8

@@ -55,8 +55,8 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     """Line the inside of a closed surface with convex cells, which overlap at its convex edges.
 
     Args:
-        analysis: Of a `solid` mesh.
-        faces: (k,) rows of `analysis.faces` to be lined.
+        analysis: The mesh.
+        faces: (k,) rows of `analysis.faces`, of its `solids`, to be lined.
         thickness: Height of the prisms where there is no room for a cell.
         work: What may be done; None sets no bound.
 
@@ -72,7 +72,9 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     for polygon in polygons:
         normals[list(polygon.faces)] = polygon.normal
     sides = pair_sides(vertices, chosen, table, normals, work)
-    solid = np.where(analysis.component_volumes > 0, np.arange(analysis.components), -1)[analysis.component]
+    # An open piece has no inside, so that it takes no room.
+    cavity = analysis.solids & (analysis.component_volumes <= 0)
+    solid = np.where(cavity, -1, np.arange(analysis.components))[analysis.component]
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
     around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing, work)
     found: list[tuple[_Cell, ...]] = [()] * len(polygons)

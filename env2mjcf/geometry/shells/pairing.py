@@ -14,10 +14,7 @@ from ..analysis import Analysis
 from ..coplanar import Polygon
 from ..orientation import encloses
 from ..pieces import ConvexPiece
-from ..topology import Edges, Floats, Ints, connected
-
-# Angles in radians below which two faces coincide: the solid that touches here is another one.
-_COINCIDENT = 1e-6
+from ..topology import Edges, Floats, Ints, connected, facing
 
 # Angles between the faces of a solid from which on an edge counts as blunt: sides that follow the neighbour would reach
 # far beyond the polygon, and cost time.
@@ -47,8 +44,7 @@ def pair_sides(vertices: Floats, faces: Ints, table: Edges, normals: Floats, wor
     cells: a body that lies on one face would touch with the blades of all others, and several contacts of a blade get
     the normal of its own side, not of the face. At blunt, flat, reflex and open edges the side goes straight down.
 
-    Where more than two faces meet, the partner of a face is the first one of opposite direction that a rotation from
-    the face into the solid finds.
+    Where more than two faces meet, the partner of a face is the one that `facing` finds.
 
     Args:
         vertices: (n, 3).
@@ -61,37 +57,12 @@ def pair_sides(vertices: Floats, faces: Ints, table: Edges, normals: Floats, wor
         TooMuchWorkError: So many faces meet at edges that it takes more.
     """
     work.spend(int((table.faces**2).sum()))
-    corner = np.argsort(table.of_corner.ravel(), kind="stable")
-    start = np.concatenate([[0], np.cumsum(table.faces)[:-1]]).astype(np.int64)
-    along = vertices[faces[:, (1, 2, 0)]] - vertices[faces]
-    along /= np.linalg.norm(along, axis=2, keepdims=True)
-    inward = np.cross(normals[:, None], along)
-    here, there = _candidates(table.faces, start, corner)
-    opposite = table.forward.ravel()[here] != table.forward.ravel()[there]
-    here, there = here[opposite], there[opposite]
-    normal, own, other = normals[here // 3], inward.reshape(-1, 3)[here], inward.reshape(-1, 3)[there]
-    angle = np.arctan2(-np.einsum("ij,ij->i", normal, other), np.einsum("ij,ij->i", own, other)) % (2 * np.pi)
-    angle[angle < _COINCIDENT] = 2 * np.pi
-    order = np.lexsort((there, angle, here))
-    first = order[np.concatenate([[True], np.diff(here[order]) > 0])[: len(order)]]
+    here, there, angle, folded = facing(vertices, faces, table, normals)
     slopes = np.zeros(faces.size)
-    convex = first[angle[first] < _BLUNT]
+    convex = angle < _BLUNT
     slopes[here[convex]] = 1 / np.tan(angle[convex])
-    links = np.stack([here[first] // 3, there[first] // 3], axis=1)
-    return Sides(slopes.reshape(-1, 3), links, bool((angle > 2 * np.pi - _COINCIDENT).any()))
-
-
-def _candidates(count: Ints, start: Ints, corner: Ints) -> tuple[Ints, Ints]:
-    """Return all ordered pairs of different corners at one edge."""
-    here: list[Ints] = []
-    there: list[Ints] = []
-    for size in np.unique(count[count > 1]).tolist():
-        members = corner[start[count == size][:, None] + np.arange(size)]
-        a, b = np.nonzero(~np.eye(size, dtype=np.bool_))
-        here.append(members[:, a].ravel())
-        there.append(members[:, b].ravel())
-    empty = np.zeros(0, dtype=np.int64)
-    return np.concatenate([empty, *here]), np.concatenate([empty, *there])
+    links = np.stack([here // 3, there // 3], axis=1)
+    return Sides(slopes.reshape(-1, 3), links, folded)
 
 
 def doubtful_polygons(
@@ -122,12 +93,13 @@ def doubtful_polygons(
     some = range(len(cells)) if suspect else np.unique(patch, return_index=True)[1].tolist()
     tested = [(i, cell) for i in some for cell in cells[i]]
     insides = np.reshape([cell.center for _, cell in tested], (-1, 3))
-    outside = ~encloses(analysis.vertices, analysis.faces, insides, work)
+    surface = analysis.enclosing
+    outside = ~encloses(analysis.vertices, surface, insides, work)
     wrong = patch[[i for (i, _), out in zip(tested, outside.tolist(), strict=True) if out]]
     doubtful = [i for i, own in enumerate(cells) if not own or patch[i] in wrong]
     middles = np.array([analysis.vertices[list(polygons[i].loop)].mean(axis=0) for i in doubtful]).reshape(-1, 3)
     step = thickness / 2 * np.array([polygons[i].normal for i in doubtful]).reshape(-1, 3)
-    under, over = (encloses(analysis.vertices, analysis.faces, p, work) for p in (middles - step, middles + step))
+    under, over = (encloses(analysis.vertices, surface, p, work) for p in (middles - step, middles + step))
     turn = ~under & over
     return {
         i: replace(polygons[i], loop=polygons[i].loop[::-1], normal=-polygons[i].normal) if t else polygons[i]

@@ -8,7 +8,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..tables import BLOCK, FIRST_POINT, IS_BOX, IS_SOLID, LANES, LAST_POINT, ROOT, SHAPE, START, STEP, TOP, Tables
+from ..tables import (
+    BLOCK,
+    ENCLOSING,
+    FIRST_POINT,
+    IS_BOX,
+    IS_SOLID,
+    LANES,
+    LAST_POINT,
+    ROOT,
+    SHAPE,
+    START,
+    STEP,
+    TOP,
+    Tables,
+)
 from .boxes import boxes_apart, lanes_about, lanes_near
 from .compiling import Room, compiled, compiled_strictly, inlined
 from .poses import Pose, Vector, inverted, larger, moved, relative, smaller
@@ -152,7 +166,7 @@ def _holds_any(tables: Tables, s: int, t: int, m: Pose, stack: Any) -> bool:
 
 @compiled
 def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) -> bool:
-    """Return whether a point of a shape's frame lies inside of it: its surface winds around it.
+    """Return whether a point of a shape's frame lies inside of it: the surface of its closed pieces winds around it.
 
     Counts what a ray passes, outwards minus inwards, which is the winding number of a closed surface. Which side of an
     edge the ray passes is decided from the same numbers for both of its triangles, so that it passes one of the two.
@@ -163,7 +177,7 @@ def holds(tables: Tables, shape: int, x: float, y: float, z: float, stack: Any) 
     # The ray's foot in the plane z = 0, along its lean.
     u, v = x - _LEAN_X * z, y - _LEAN_Y * z
     winding = 0
-    stack[0] = tables.shapes[shape, START]
+    stack[0] = tables.shapes[shape, ENCLOSING]
     count = 1
     while count > 0:
         count -= 1
