@@ -42,20 +42,20 @@ class Repaired:
     sheets: int = 0
 
 
-def repaired(mesh: Mesh, work: Work | None = None) -> Repaired:
+def repaired(mesh: Mesh, work: Work | None = None, concave: float = 0.0) -> Repaired:
     """Analyse a mesh; where open edges run along each other with different vertices, cut the faces there.
 
-    Then unfold what is folded, if the surface is that of a solid.
+    Then unfold what is folded, if the surface is that of a solid. The arguments are those of `analyse`.
 
     Raises:
         TooMuchWorkError: It takes more than `work` has left.
     """
     work = work or Work()
-    return _without_folds(mesh, _without_t_junctions(mesh, work), work)
+    return _without_folds(mesh, _without_t_junctions(mesh, work, concave), work, concave)
 
 
-def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
-    before = analyse(mesh, work)
+def _without_t_junctions(mesh: Mesh, work: Work, concave: float) -> Repaired:
+    before = analyse(mesh, work, concave)
     open_before = _open_edges(before.faces)
     if before.dimension < 3 or not open_before:
         return Repaired(before)
@@ -66,11 +66,11 @@ def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
             break
     if _open_edges(faces) >= open_before:
         return Repaired(before)
-    after = _again(mesh, before, faces, source, work)
+    after = _again(mesh, before, faces, source, work, concave)
     return Repaired(after, int((np.bincount(source) > 1).sum()), open_before)
 
 
-def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
+def _without_folds(mesh: Mesh, result: Repaired, work: Work, concave: float) -> Repaired:
     before = result.analysis
     # A convex mesh collides as its hull, whatever its faces are.
     new = unfolded(before) if before.solid and not before.convex else None
@@ -78,7 +78,7 @@ def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
         return result
     # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
     after = replace(
-        _again(mesh, before, new.faces, new.source, work),
+        _again(mesh, before, new.faces, new.source, work, concave),
         consistent=before.consistent,
         inverted=before.inverted,
         signed_volume=before.signed_volume,
@@ -90,9 +90,9 @@ def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
     return replace(result, analysis=after, folded_faces=new.rebuilt, sheets=new.sheets)
 
 
-def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work) -> Analysis:
+def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work, concave: float) -> Analysis:
     """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up."""
-    after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path), work)
+    after = analyse(Mesh.from_arrays(mesh.name, before.vertices, faces, mesh.path), work, concave)
     return replace(
         after,
         source=before.source[source[after.source]],

@@ -22,6 +22,10 @@ from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
 
+CONCAVE_PER_THICKNESS = 0.2
+"""How far a point of a convex surface may lie inside its hull, in units of the thickness: a tenth of the band in which
+verdicts may differ from the triangles, which is two thicknesses wide."""
+
 # Triangles above which reading a file is quicker than computing its content.
 _WORTH_KEEPING = 200
 
@@ -119,7 +123,7 @@ def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Colli
 
 def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
     if analysis.convex:
-        return "convex: one hull"
+        return f"convex{f' to {analysis.concavity:.2g} m' * (analysis.concavity > analysis.tolerance)}: one hull"
     if analysis.flat:
         return "flat: one thin plate, the convex hull of its outline"
     claimed = hull_volume(piece.vertices)
@@ -157,7 +161,7 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         shape = _surface(mesh, analysis, thickness, work)
         why = "no winding tells its sides apart" if analysis.closed else "the mesh is open and has no inside"
         return replace(shape, needs_containment=analysis.closed, note=f"{why}: {shape.note}")
-    whole = _convex_solids(analysis, work)
+    whole = _convex_solids(analysis, thickness, work)
     hulls = tuple(
         hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
         for c in np.flatnonzero(whole)
@@ -194,7 +198,7 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
     return CollisionShape(mesh, "coacd", pieces, False, analysis, note)
 
 
-def _convex_solids(analysis: Analysis, work: Work) -> Bools:
+def _convex_solids(analysis: Analysis, thickness: float, work: Work) -> Bools:
     """Tell which components are convex solids without a cavity in them, (c,).
 
     A solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
@@ -212,7 +216,8 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     for c in np.flatnonzero(~cavities):
         if ((low[cavities] > high[c]) | (high[cavities] < low[c])).any(axis=1).all():
             faces = parts[c][1].reshape(-1, 3).astype(np.int64)
-            out[c] = is_convex(points[c], faces, RELATIVE_TOLERANCE * size[c])
+            most = max(CONCAVE_PER_THICKNESS * thickness, RELATIVE_TOLERANCE * float(size[c]))
+            out[c] = is_convex(points[c], faces, most, work=work)
     return out
 
 
