@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..limits import Work
+from .extremes import PointTree
 from .orientation import winding_numbers
 from .pieces import hull_faces
-from .topology import Bools, Edges, Floats, Ints, area_vectors, connected, edges
+from .topology import Edges, Floats, Ints, area_vectors, connected, edges
 
 _BLOCK = 4_000_000  # numbers held in memory at once
-_PLANES = 512  # planes that go down the tree together
 _SAME_SIDE = 1e-3  # normals that differ by less on every axis may belong to one flat side
 _RINGS = 8  # of neighbours whose planes a triangle tries
 _SMOOTHINGS = 3
 _HALVINGS = 5
+_PROBES = 500
 _MOST = 200_000_000  # pairs of triangles and facets of the hull that are compared
-# The corners, edges and diagonals of a cube.
-_FAN = np.array(
-    [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=np.float64
-)
 # The corners of the four triangles that a triangle is cut into, from its corners.
 _QUARTERS = (
     np.array(
@@ -88,7 +86,7 @@ def concavity(
         return math.inf
     cover = _Cover(vertices - middle, faces if winding > 0 else faces[:, ::-1], tolerance, work or Work())
     table = table or edges(faces)
-    if cover.bulges_inwards(table) and cover.deep_inside_extremes():
+    if cover.deep_beside_edges(table):
         return math.inf
     cover.try_sides(table)
     cover.try_own(np.flatnonzero(cover.heights > tolerance))
@@ -122,30 +120,27 @@ class _Cover:
         self._work = work
         self._normals = self.areas / np.linalg.norm(self.areas, axis=1, keepdims=True)
         self._offsets = np.full(len(faces), np.inf)
-        self._boxes, self._leaves = _tree(points)
+        self._tree = PointTree(points)
 
-    def bulges_inwards(self, table: Edges) -> bool:
-        """Tell whether a corner of a neighbour is above a triangle: most non-convex meshes are found by that."""
+    def deep_beside_edges(self, table: Edges) -> bool:
+        """Tell whether a triangle that a neighbour rises above is deep inside the hull, as of most concave meshes."""
         first, second, _ = table.neighbours()
+        rising: list[Ints] = []
         for here, there in ((first, second), (second, first)):
             normal, opposite = self._normals[here // 3], self.faces[there // 3, (there % 3 + 2) % 3]
             apart = self._points[opposite] - self._points[self.faces[here // 3, 0]]
-            if (np.einsum("ij,ij->i", normal, apart) > self._tolerance).any():
-                return True
-        return False
-
-    def deep_inside_extremes(self) -> bool:
-        """Tell whether a triangle's middle is deep inside the hull of a few extreme vertices, so inside the whole."""
-        extremes = np.unique((self._points @ _FAN.T).argmax(axis=0))
-        hull = _hull(self._points[extremes])
-        if hull is None:
+            rising.append(here[np.einsum("ij,ij->i", normal, apart) > self._tolerance] // 3)
+        rows = np.unique(np.concatenate(rising))
+        if not len(rows) or self._hull is None:
             return False
-        normals, offsets = hull
-        middles = self._points[self.faces].mean(axis=1)
+        normals, offsets = self._hull
+        some = rows[:: -(-len(rows) // _PROBES)]
+        points = self._points[self.faces[some]]
+        points = np.concatenate([points.reshape(-1, 3), points.mean(axis=1)])
         step = max(1, _BLOCK // len(normals))
         return any(
-            ((offsets - middles[i : i + step] @ normals.T).min(axis=1) > self._tolerance).any()
-            for i in range(0, len(middles), step)
+            ((offsets - points[i : i + step] @ normals.T).min(axis=1) > self._tolerance).any()
+            for i in range(0, len(points), step)
         )
 
     def try_sides(self, table: Edges) -> None:
@@ -193,7 +188,7 @@ class _Cover:
         rest = np.flatnonzero(self.heights > self._tolerance)
         if not len(rest):
             return float(self.heights.max())
-        hull = _hull(self._points)
+        hull = self._hull
         if hull is None:
             return math.inf
         # What is large is most likely to be deep inside, and one such triangle is enough.
@@ -230,6 +225,18 @@ class _Cover:
         lowest = np.einsum("pki,pi->pk", triangles, normals[best]).min(axis=1)
         return exact - lowest, deep
 
+    @cached_property
+    def _hull(self) -> tuple[Floats, Floats] | None:
+        """Normals, (f, 3), and offsets of the facets of the hull; None where the points are as good as coplanar."""
+        try:
+            corners = self._points[hull_faces([self._points])[0]]
+        except ValueError:
+            return None
+        normals = area_vectors(corners)
+        length = np.linalg.norm(normals, axis=1)
+        normals = normals[length > 0] / length[length > 0, None]
+        return normals, np.einsum("fki,fi->fk", corners[length > 0], normals).max(axis=1)
+
     def _corners(self, rows: Ints, normals: Floats) -> Floats:
         """Return the heights of the three corners of triangles along normals, (r, 3)."""
         return np.einsum("rki,ri->rk", self._points[self.faces[rows]], normals)
@@ -241,44 +248,10 @@ class _Cover:
         self.heights[rows], self._offsets[rows], self._normals[rows] = heights[better], offsets[better], normals[better]
 
     def _supports(self, normals: Floats, lowest: Floats, highest: Floats) -> Floats:
-        """Return the height of the highest vertex along each normal; infinite where that is too far above `lowest`.
-
-        Goes down a tree of boxes: what lies below a vertex that is known, first the one at `highest`, is not opened.
-        """
-        best, limits = highest.copy(), lowest + self._tolerance
-        for i in range(0, len(normals), _PLANES):
-            part = slice(i, i + _PLANES)
-            self._raise(best[part], normals[part], limits[part])
-        return np.where(best <= limits, best, np.inf)
-
-    def _raise(self, best: Floats, normals: Floats, limits: Floats) -> None:
-        plane, node = np.arange(len(normals)), np.zeros(len(normals), dtype=np.int64)
-        for depth, (middle, half, sample) in enumerate(self._boxes):
-            if depth:
-                plane, node = np.repeat(plane, 2), (2 * node[:, None] + (0, 1)).ravel()
-            self._work.spend(len(plane) // 8)
-            normal = normals[plane]
-            np.maximum.at(best, plane, (normal * sample[node]).sum(axis=1))
-            reach = (normal * middle[node] + np.abs(normal) * half[node]).sum(axis=1)
-            opened = (reach > best[plane]) & (best[plane] <= limits[plane])
-            plane, node = plane[opened], node[opened]
-        step = max(1, _BLOCK // (4 * self._leaves.shape[1]))
-        for j in range(0, len(plane), step):
-            p = plane[j : j + step]
-            heights = (self._leaves[node[j : j + step]] @ normals[p][:, :, None])[:, :, 0]
-            np.maximum.at(best, p, heights.max(axis=1))
-
-
-def _hull(points: Floats) -> tuple[Floats, Floats] | None:
-    """Return normals, (f, 3), and offsets of the facets of a hull; None where the points are as good as coplanar."""
-    try:
-        corners = points[hull_faces([points])[0]]
-    except ValueError:
-        return None
-    normals = area_vectors(corners)
-    length = np.linalg.norm(normals, axis=1)
-    normals = normals[length > 0] / length[length > 0, None]
-    return normals, np.einsum("fki,fi->fk", corners[length > 0], normals).max(axis=1)
+        """Return the height of the highest vertex along each normal; infinite where that is too far above `lowest`."""
+        limits = lowest + self._tolerance
+        heights = self._tree.highest(normals, highest, limits, self._work)
+        return np.where(heights <= limits, heights, np.inf)
 
 
 def _smoothed(vectors: Floats, faces: Ints, count: int) -> Floats:
@@ -287,26 +260,6 @@ def _smoothed(vectors: Floats, faces: Ints, count: int) -> Floats:
         [np.bincount(faces.ravel(), np.repeat(vectors[:, k], 3), minlength=count) for k in range(3)], axis=1
     )
     return at_vertex[faces].sum(axis=1)
-
-
-def _tree(vertices: Floats, size: int = 8) -> tuple[list[tuple[Floats, Floats, Floats]], Floats]:
-    """Split points at medians.
-
-    Returns:
-        Middles and half sides of the boxes at each depth and a point of each, (2**depth, 3), and the leaves' points,
-        (leaves, size, 3), some of them twice where the number does not divide.
-    """
-    count = 1 << max(0, int(np.ceil(np.log2(len(vertices) / size))))
-    parts = np.resize(vertices, (-(-len(vertices) // count) * count, 3))[None]
-    boxes: list[tuple[Floats, Floats, Floats]] = []
-    while True:
-        low, high = parts.min(axis=1), parts.max(axis=1)
-        boxes.append(((low + high) / 2, (high - low) / 2, parts[:, 0]))
-        if len(parts) == count:
-            return boxes, parts
-        along = np.take_along_axis(parts, (high - low).argmax(axis=1)[:, None, None], axis=2)[:, :, 0]
-        order = np.argsort(along, axis=1, kind="stable")
-        parts = np.take_along_axis(parts, order[:, :, None], axis=1).reshape(2 * len(parts), -1, 3)
 
 
 def exact_box(vertices: Floats, faces: Ints, tolerance: float) -> Box | None:
