@@ -13,7 +13,7 @@ from ..errors import Span, counted
 from ..limits import Work
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
-from .convexity import is_convex
+from .convexity import Box, exact_box, is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
@@ -44,6 +44,7 @@ class CollisionShape:
         analysis: The mesh's analysis.
         note: One sentence for the report.
         omitted_area: Area of polygons that are too small for MuJoCo.
+        box: The box that the one piece is, to within a tenth of the band of contact.
     """
 
     mesh: Mesh
@@ -53,6 +54,7 @@ class CollisionShape:
     analysis: Analysis
     note: str
     omitted_area: float = 0.0
+    box: Box | None = None
 
 
 def collision_shape(
@@ -95,7 +97,7 @@ def collision_shape(
     try:
         if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
             what, known = ("shape", mesh.digest, strategy, thickness), {"mesh": mesh, "analysis": analysis}
-            kinds = CollisionShape, ConvexPiece, Polygon
+            kinds = CollisionShape, ConvexPiece, Polygon, Box
             shape = cache.remember(what, build, kinds=kinds, known=known, log=log, subject=subject)
         else:
             shape = build()
@@ -118,7 +120,14 @@ def collision_shape(
 
 def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     piece = hull_piece(analysis.vertices, thickness)
-    return CollisionShape(mesh, "hull", (piece,), False, analysis, _hull_note(analysis, piece))
+    note = _hull_note(analysis, piece)
+    most = _concave_at_most(thickness, analysis.diagonal)
+    box = exact_box(analysis.vertices, analysis.faces, most) if analysis.convex else None
+    return CollisionShape(mesh, "hull", (piece,), False, analysis, note, box=box)
+
+
+def _concave_at_most(thickness: float, diagonal: float) -> float:
+    return max(CONCAVE_PER_THICKNESS * thickness, RELATIVE_TOLERANCE * diagonal)
 
 
 def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
@@ -216,8 +225,7 @@ def _convex_solids(analysis: Analysis, thickness: float, work: Work) -> Bools:
     for c in np.flatnonzero(~cavities):
         if ((low[cavities] > high[c]) | (high[cavities] < low[c])).any(axis=1).all():
             faces = parts[c][1].reshape(-1, 3).astype(np.int64)
-            most = max(CONCAVE_PER_THICKNESS * thickness, RELATIVE_TOLERANCE * float(size[c]))
-            out[c] = is_convex(points[c], faces, most, work=work)
+            out[c] = is_convex(points[c], faces, _concave_at_most(thickness, float(size[c])), work=work)
     return out
 
 
