@@ -23,6 +23,6 @@ def _teach_byu(module: Any) -> None:
     import_module(".formats.meshes.byu", __name__).teach(module)
 
 
-# trimesh reads and writes `.g` meshes, too, once env2mjcf is imported, before trimesh or after it.
+# trimesh reads and writes `.g` and `.byu` meshes, too, once env2mjcf is imported, before trimesh or after it.
 after_import("trimesh.exchange.load", _teach_byu)
 after_import("trimesh.exchange.export", _teach_byu)

@@ -39,7 +39,7 @@ class Options:
         mesh_dirs: More folders in which meshes are looked for.
         allow_outside: Read files outside the scene's folder and `mesh_dirs`, too, that a scene or problem XML names.
         collision: How meshes become convex collision shapes.
-        primitives: Write exact boxes as box geoms.
+        primitives: Write exact boxes as box geoms, where solids collide.
         self_collision: Test links of one robot against each other; unless given, what a problem XML says, else True.
         adjacent_links: Links within this many connections of each other are not tested; unless given, what a problem
             XML says, else 1.

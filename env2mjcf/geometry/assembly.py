@@ -21,7 +21,7 @@ from .inertia import Inertial, inertial
 from .mesh import Mesh, load_mesh
 from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
-from .shapes import CollisionShape, collision_shape
+from .shapes import CONCAVE_PER_THICKNESS, CollisionShape, collision_shape
 from .store import GeometryCache, default_folder
 from .union import Union, union, union_diagnostics
 
@@ -177,7 +177,7 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
             links = tuple(meshes.part(b, thickness, moves=True) for b in bodies)
             robots[id(multibody)] = RobotParts(kinematics, home, links)
         elif id(multibody) in drawn:
-            surfaces += [meshes.part(b, None, moves=False) for b in bodies]
+            surfaces += [meshes.part(b, thickness, moves=False, collides=False) for b in bodies]
         else:
             obstacles += [meshes.part(b, thickness, moves=False) for b in bodies]
     ordered = tuple(robots[id(m)] for m in environment.robots)
@@ -212,18 +212,18 @@ class _Meshes:
         self._at_most("scene_elements", self._elements, "GEO271", "triangles", body)
         return self._meshes[key]
 
-    def part(self, placed: _Placed, thickness: float | None, *, moves: bool) -> Part:
-        """Give a placed body its shape (none without a thickness) and its inertia (where it moves)."""
+    def part(self, placed: _Placed, thickness: float, *, moves: bool, collides: bool = True) -> Part:
+        """Give a placed body its shape (where it collides) and its inertia (where it moves)."""
         mesh, body, options = placed.mesh, placed.body, self._options
         if mesh not in self._analyses:
             work = Work(options.limits.mesh_work)
             with bounded(options.limits, self._log, body.filename, body.span):
-                result = repaired(mesh, work)
+                result = repaired(mesh, work, CONCAVE_PER_THICKNESS * thickness)
             self._analyses[mesh] = result.analysis, work
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis, work = self._analyses[mesh]
         shape = proof = None
-        if thickness is not None:
+        if collides:
             if mesh not in self._shapes:
                 self._shapes[mesh] = self._shaped(mesh, analysis, thickness, body, work)
             shape, proof = self._shapes[mesh]

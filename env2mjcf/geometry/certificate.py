@@ -10,6 +10,7 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from .distance import distances, spread
+from .extremes import PointTree
 from .orientation import encloses
 from .pieces import hull_faces, hull_volume
 from .shapes import CollisionShape
@@ -21,12 +22,16 @@ APPROXIMATE = ("hull", "coacd")
 
 _SURFACE_POINTS = 3000
 _LATTICE_POINTS = 4096
-_LEAST_LATTICE = 1000
 _WORK = 1_000_000  # pairs of lattice points and triangles
+# Fewer points are taken of meshes of very many triangles only: about twenty seconds at most for each of these.
+_LEAST_LATTICE, _MOST_WORK = 1000, 20_000_000
+_LEAST_POINTS, _MOST_DISTANCES = 1000, 200_000_000
+_FEWEST = 100
 # Each lattice point lies elsewhere in its cell, so that counts are not all wrong by the same part of a cell: Roberts,
 # "The unreasonable effectiveness of quasirandom sequences", 2018.
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 _BATCH = 64
+_BLOCK = 2_000_000  # heights held in memory at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +119,9 @@ def certify(shape: CollisionShape, thickness: float) -> Certificate:
     if shape.strategy not in APPROXIMATE or analysis.convex or parts:
         surface = shape.strategy == "surface" and not shape.needs_containment
         lost = analysis.volume if surface else 0.0
-        return Certificate(True, 0.0, lost, thickness, thickness, thickness, 0, 0.0, 0.0, 1.0 if lost else 0.0)
+        # A hull reaches beyond the mesh by what that is concave.
+        band = max(thickness, analysis.concavity) if analysis.convex else thickness
+        return Certificate(True, 0.0, lost, band, band, band, 0, 0.0, 0.0, 1.0 if lost else 0.0)
     return _measured(shape, thickness)
 
 
@@ -130,7 +137,9 @@ class _Pieces:
         """Tell which points lie in any piece, (k,)."""
         out = np.zeros(len(points), dtype=np.bool_)
         for normals, offsets in self.planes:
-            out |= (points @ normals.T <= offsets).all(axis=1)
+            step = max(1, _BLOCK // len(normals))
+            for i in range(0, len(points), step):
+                out[i : i + step] |= (points[i : i + step] @ normals.T <= offsets).all(axis=1)
         return out
 
 
@@ -143,7 +152,8 @@ def _pieces(shape: CollisionShape) -> _Pieces:
         length = np.linalg.norm(normals, axis=1)
         normals = normals[length > 0] / length[length > 0, None]
         # The farthest corner, so that float32 in the hull lets no point of the cloud out.
-        planes.append((normals, (normals @ cloud.T).max(axis=1)))
+        known = np.einsum("fki,fi->fk", cloud[own[length > 0]], normals).max(axis=1)
+        planes.append((normals, PointTree(cloud).highest(normals, known)))
     starts = np.cumsum([0, *(len(c) for c in clouds)])
     joined = np.concatenate([own + start for own, start in zip(faces, starts, strict=False)])
     return _Pieces(np.concatenate(clouds), joined, tuple(planes))
@@ -154,18 +164,20 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
     vertices, faces = analysis.vertices, analysis.faces
     lattice, cell, gap = _lattice(pieces.vertices, vertices, len(faces))
     claimed = pieces.inside(lattice)
-    owned = _in_solid(lattice, shape)
-    on_pieces, gap_pieces = spread(pieces.vertices, pieces.faces, _SURFACE_POINTS)
+    owned = np.zeros(len(lattice), dtype=np.bool_)
+    # The hull holds all of the mesh.
+    tested = claimed if shape.strategy == "hull" else np.ones_like(claimed)
+    owned[tested] = _in_solid(lattice[tested], shape)
+    on_pieces, gap_pieces = _on_surface(pieces.vertices, pieces.faces, len(faces))
     beyond = np.concatenate([on_pieces, lattice[claimed & ~owned]])
     reach_added = _reach(beyond, distances(beyond, vertices, faces), lambda p: _in_solid(p, shape))
     samples, gap = len(on_pieces) + len(lattice), max(gap, gap_pieces)
     added, lost, reach_lost = float((claimed & ~owned).sum() * cell), float((owned & ~claimed).sum() * cell), 0.0
-    if shape.strategy == "hull":  # it holds all of the mesh
-        lost = 0.0
+    if shape.strategy == "hull":
         if analysis.solid and analysis.components == 1:
             added = max(0.0, hull_volume(vertices) - analysis.volume)
     else:
-        on_mesh, gap_mesh = spread(vertices, faces, _SURFACE_POINTS)
+        on_mesh, gap_mesh = _on_surface(vertices, faces, len(pieces.faces))
         under = np.concatenate([on_mesh, lattice[owned & ~claimed]])
         reach_lost = _reach(under, distances(under, pieces.vertices, pieces.faces), pieces.inside)
         samples, gap = samples + len(on_mesh), max(gap, gap_mesh)
@@ -187,11 +199,28 @@ def _measured(shape: CollisionShape, thickness: float) -> Certificate:
     )
 
 
+def _on_surface(vertices: Floats, faces: Ints, others: int) -> tuple[Floats, float]:
+    """Return points on a surface whose distances from `others` triangles are to be found, and their greatest gap."""
+    points, gap = spread(vertices, faces, _SURFACE_POINTS)
+    points = np.unique(points, axis=0)
+    most = max(_LEAST_POINTS, _MOST_DISTANCES // others)
+    if len(points) <= most:
+        return points, gap
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    width, kept = float(size.max()) / most, points
+    while len(kept) > most:
+        width *= 1.25
+        cells = np.floor((points - low) / width).astype(np.int64)
+        kept = points[np.unique(cells, axis=0, return_index=True)[1]]
+    return kept, gap + width * float(np.sqrt(3.0))
+
+
 def _lattice(first: Floats, second: Floats, triangles: int) -> tuple[Floats, float, float]:
     """Return points that fill the box around both point sets, the volume of each one's cell, and their greatest gap."""
     points = np.concatenate([first, second])
     low, size = points.min(axis=0), np.ptp(points, axis=0)
-    count = max(_LEAST_LATTICE, min(_LATTICE_POINTS, _WORK // max(1, triangles)))
+    least = max(_FEWEST, min(_LEAST_LATTICE, _MOST_WORK // max(1, triangles)))
+    count = max(least, min(_LATTICE_POINTS, _WORK // max(1, triangles)))
     width = float(np.prod(np.maximum(size, 1e-3 * size.max())) / count) ** (1 / 3)
     cuts = np.maximum(1, np.ceil(size / width)).astype(np.int64)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in cuts), indexing="ij"), axis=-1).reshape(-1, 3)

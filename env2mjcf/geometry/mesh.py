@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..diagnostics import DiagnosticLog
 from ..formats.meshes.byu import read_byu, read_gms
 from ..formats.meshes.obj import read_obj
-from ..formats.meshes.text import MeshArrays
+from ..formats.meshes.text import MeshArrays, text_of
 from ..formats.source import read_at_most, wide_encoding
 from ..limits import LARGEST, Limits
 from ..model.environment import Recentring
@@ -96,6 +96,7 @@ class Mesh:
 
 _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] = {
     ".g": read_byu,
+    ".byu": read_byu,
     ".dat": read_gms,
     ".obj": read_obj,
 }
@@ -131,6 +132,9 @@ def load_mesh(path: Path, log: DiagnosticLog, limits: Limits) -> Mesh:
         vertices, faces = _READERS[extension](data, str(path), log, limits)
     else:
         log.info("GEO208", str(path), f"{path} is read through trimesh: the original planner did not read this format")
+        # Of these formats each but `.glb` may be a text.
+        if data.isascii() and b"\0" not in data.rstrip(b"\0\x1a\r\n"):
+            data = text_of(data, str(path), log)
         vertices, faces = _through_trimesh(data, extension, path, log, limits)
     largest = float(np.abs(vertices).max())
     if largest > LARGEST:

@@ -42,20 +42,20 @@ class Repaired:
     sheets: int = 0
 
 
-def repaired(mesh: Mesh, work: Work | None = None) -> Repaired:
+def repaired(mesh: Mesh, work: Work | None = None, concave: float = 0.0) -> Repaired:
     """Analyse a mesh; where open edges run along each other with different vertices, cut the faces there.
 
-    Then unfold what is folded, if the surface is that of a solid.
+    Then unfold what is folded, if the surface is that of a solid. The arguments are those of `analyse`.
 
     Raises:
         TooMuchWorkError: It takes more than `work` has left.
     """
     work = work or Work()
-    return _without_folds(mesh, _without_t_junctions(mesh, work), work)
+    return _without_folds(mesh, _without_t_junctions(mesh, work, concave), work, concave)
 
 
-def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
-    before = analyse(mesh, work)
+def _without_t_junctions(mesh: Mesh, work: Work, concave: float) -> Repaired:
+    before = analyse(mesh, work, concave)
     # What is closed by itself stays as it is, whatever touches it.
     loose = ~before.closed_components[before.component]
     source, shut = np.flatnonzero(loose), np.flatnonzero(~loose)
@@ -70,11 +70,11 @@ def _without_t_junctions(mesh: Mesh, work: Work) -> Repaired:
     if _open_edges(faces) >= open_before:
         return Repaired(before)
     faces, source = np.concatenate([before.faces[shut], faces]), np.concatenate([shut, source])
-    after = _again(mesh, before, faces, source, work)
+    after = _again(mesh, before, faces, source, work, concave)
     return Repaired(after, int((np.bincount(source) > 1).sum()), open_before)
 
 
-def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
+def _without_folds(mesh: Mesh, result: Repaired, work: Work, concave: float) -> Repaired:
     before = result.analysis
     # A convex mesh collides as its hull, whatever its faces are.
     new = unfolded(before) if before.solids.any() and not before.convex else None
@@ -82,7 +82,7 @@ def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
         return result
     # What is told about the file's winding and edges is known already: the new faces agree, and sheets crowd edges.
     after = replace(
-        _again(mesh, before, new.faces, new.source, work),
+        _again(mesh, before, new.faces, new.source, work, concave),
         consistent=before.consistent,
         inverted=before.inverted,
         signed_volume=before.signed_volume,
@@ -96,7 +96,7 @@ def _without_folds(mesh: Mesh, result: Repaired, work: Work) -> Repaired:
     return replace(result, analysis=after, folded_faces=new.rebuilt, sheets=new.sheets)
 
 
-def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work) -> Analysis:
+def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work, concave: float) -> Analysis:
     """Analyse faces over the vertices of an earlier analysis, made of its faces `source`; counts add up.
 
     Each closed piece gets vertices of its own, so that it is told again from what touches it.
@@ -108,7 +108,8 @@ def _again(mesh: Mesh, before: Analysis, faces: Ints, source: Ints, work: Work) 
     again = np.concatenate([np.zeros(1, dtype=np.bool_), vertex[1:] == vertex[:-1]])[: len(vertex)]
     number = np.where(again, len(before.vertices) + np.cumsum(again) - 1, vertex)
     vertices = np.concatenate([before.vertices, before.vertices[vertex[again]]])
-    after = analyse(Mesh.from_arrays(mesh.name, vertices, number[faces.reshape(-1, 3)], mesh.path), work)
+    separate = Mesh.from_arrays(mesh.name, vertices, number[faces.reshape(-1, 3)], mesh.path)
+    after = analyse(separate, work, concave)
     return replace(
         after,
         source=before.source[source[after.source]],

@@ -13,7 +13,7 @@ from ..errors import Span, counted
 from ..limits import Work
 from ..options import Collision
 from .analysis import Analysis, refuse_without_area
-from .convexity import is_convex
+from .convexity import Box, exact_box, is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
@@ -21,6 +21,10 @@ from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
+
+CONCAVE_PER_THICKNESS = 0.2
+"""How far a point of a convex surface may lie inside its hull, in units of the thickness: a tenth of the band in which
+verdicts may differ from the triangles, which is two thicknesses wide."""
 
 # Triangles above which reading a file is quicker than computing its content.
 _WORTH_KEEPING = 200
@@ -40,6 +44,7 @@ class CollisionShape:
         analysis: The mesh's analysis.
         note: One sentence for the report.
         omitted_area: Area of polygons that are too small for MuJoCo.
+        box: The box that the one piece is, to within a tenth of the band of contact.
     """
 
     mesh: Mesh
@@ -49,6 +54,7 @@ class CollisionShape:
     analysis: Analysis
     note: str
     omitted_area: float = 0.0
+    box: Box | None = None
 
 
 def collision_shape(
@@ -91,7 +97,7 @@ def collision_shape(
     try:
         if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
             what, known = ("shape", mesh.digest, strategy, thickness), {"mesh": mesh, "analysis": analysis}
-            kinds = CollisionShape, ConvexPiece, Polygon
+            kinds = CollisionShape, ConvexPiece, Polygon, Box
             shape = cache.remember(what, build, kinds=kinds, known=known, log=log, subject=subject)
         else:
             shape = build()
@@ -114,12 +120,19 @@ def collision_shape(
 
 def _hull(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     piece = hull_piece(analysis.vertices, thickness)
-    return CollisionShape(mesh, "hull", (piece,), False, analysis, _hull_note(analysis, piece))
+    note = _hull_note(analysis, piece)
+    most = _concave_at_most(thickness, analysis.diagonal)
+    box = exact_box(analysis.vertices, analysis.faces, most) if analysis.convex else None
+    return CollisionShape(mesh, "hull", (piece,), False, analysis, note, box=box)
+
+
+def _concave_at_most(thickness: float, diagonal: float) -> float:
+    return max(CONCAVE_PER_THICKNESS * thickness, RELATIVE_TOLERANCE * diagonal)
 
 
 def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
     if analysis.convex:
-        return "convex: one hull"
+        return f"convex{f' to {analysis.concavity:.2g} m' * (analysis.concavity > analysis.tolerance)}: one hull"
     if analysis.flat:
         return "flat: one thin plate, the convex hull of its outline"
     claimed = hull_volume(piece.vertices)
@@ -168,7 +181,7 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         shape = _surface(mesh, analysis, thickness, work)
         why = "no winding tells its sides apart" if closed.any() else "the mesh is open and has no inside"
         return replace(shape, needs_containment=bool(closed.any()), note=f"{why}: {shape.note}")
-    whole = _convex_solids(analysis, work)
+    whole = _convex_solids(analysis, thickness, work)
     pieces = tuple(
         hull_piece(analysis.vertices[np.unique(analysis.faces[analysis.component == c])], thickness)
         for c in np.flatnonzero(whole)
@@ -220,7 +233,7 @@ def _coacd(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
     return CollisionShape(mesh, "coacd", pieces, False, analysis, note)
 
 
-def _convex_solids(analysis: Analysis, work: Work) -> Bools:
+def _convex_solids(analysis: Analysis, thickness: float, work: Work) -> Bools:
     """Tell which components are convex solids without a cavity in them, (c,).
 
     The mesh's solid is the union of its outward components, so those may touch and overlap; only a cavity takes away.
@@ -237,7 +250,7 @@ def _convex_solids(analysis: Analysis, work: Work) -> Bools:
     for c in np.flatnonzero(solid):
         if ((low[cavities] > high[c]) | (high[cavities] < low[c])).any(axis=1).all():
             faces = parts[c][1].reshape(-1, 3).astype(np.int64)
-            out[c] = is_convex(points[c], faces, RELATIVE_TOLERANCE * size[c])
+            out[c] = is_convex(points[c], faces, _concave_at_most(thickness, float(size[c])), work=work)
     return out
 
 

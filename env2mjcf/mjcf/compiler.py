@@ -9,7 +9,7 @@ from lxml import etree
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
-from ..model.environment import Environment, Task
+from ..model.environment import Task
 from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
@@ -65,7 +65,7 @@ def compile_mjcf(
     add_loops(root, compilation, log)
     if options.actuators == "position":
         add_actuators(root, assembly.robots, space, log)
-    _report_unused(environment, options, log)
+    _report_unused(assembly, options, log)
     _add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(
@@ -109,10 +109,17 @@ def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, 
         add(keyframe, "key", name=name, qpos=numbers(qpos), ctrl=numbers(ctrl) if actuated and ctrl else None)
 
 
-def _report_unused(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+def _report_unused(assembly: Assembly, options: Options, log: DiagnosticLog) -> None:
     """Report textures, controls and physical attributes, which are kept and not written, and options without effect."""
+    environment = assembly.environment
     if options.boundary is not None and environment.boundary is None:
         log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
+    if options.primitives and not any(p.shape is not None and p.shape.box is not None for p in assembly.parts()):
+        why, hint = "no body that collides is an exact box", ""
+        if options.collision == "surface":
+            why = "with collision='surface' surfaces collide, and a box geom is solid"
+            hint = "collision='auto' collides solids"
+        log.info("MJC416", environment.name, f"primitives=True has no effect: {why}", hint=hint)
     attributes = dict(environment.attributes)
     for name in _PHYSICS:
         followed = name == "gravity" and options.gravity is None and any(gravity_of_file(environment) or ())

@@ -47,7 +47,7 @@ def add_collision(
     if part.shape is None:
         return
     masks = _OBSTACLE_MASKS if obstacle else {}
-    box = part.analysis.box if primitives else None
+    box = part.shape.box if primitives else None
     if box is not None:
         name, size = f"{part.name}:0", numbers(box.half_sizes)
         place = {"pos": numbers(box.center), "quat": numbers(quaternion_from_matrix(box.rotation))}

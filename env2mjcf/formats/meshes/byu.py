@@ -1,4 +1,4 @@
-"""MOVIE.BYU `.g` meshes, also for trimesh, and the GMS `.dat` meshes of the oldest planner (docs/format/meshes.md)."""
+"""MOVIE.BYU meshes, `.g` or `.byu`, also for trimesh, and the GMS `.dat` meshes of the oldest planner (docs/format/meshes.md)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...diagnostics import DiagnosticLog
 from ...errors import GeometryError
 from ...limits import Limits
 from .numbers import Numbers, column_layouts, find_numbers
-from .text import MeshArrays, NumberFile, as_bytes
+from .text import MeshArrays, NumberFile, text_of
 
 _HEADER = ("the number of parts", "the number of vertices", "the number of polygons", "the number of edges")
 
@@ -35,7 +35,7 @@ class TriangleMesh(Protocol):
 
 
 def read_byu(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -> MeshArrays:
-    """Read a `.g` file strictly: every number in its place, every index in range.
+    """Read a `.g` or `.byu` file strictly: every number in its place, every index in range.
 
     Accepts Fortran's fixed columns without blanks, exponents with `D`, any line end and any line layout. Polygons
     with more than three corners are triangulated.
@@ -52,7 +52,7 @@ def read_byu(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     Raises:
         GeometryError: The file is not a BYU mesh, is cut off, has numbers left over or an index out of range.
     """
-    numbers = find_numbers(as_bytes(text), fortran=True)
+    numbers = find_numbers(text_of(text, path, log), fortran=True)
     try:
         return _read(NumberFile(numbers, path, log, limits))
     except GeometryError as error:
@@ -166,10 +166,10 @@ def export_byu(mesh: TriangleMesh) -> str:
 
 
 def teach(module: ModuleType) -> None:
-    """Teach trimesh the extension `.g`: its module of loaders, or that of exporters, which has no public table."""
+    """Teach trimesh `.g` and `.byu`: its module of loaders, or that of exporters, which has no public table."""
     for table, function in (("mesh_loaders", load_byu), ("_mesh_exporters", export_byu)):
         if hasattr(module, table):
-            getattr(module, table)["g"] = function
+            getattr(module, table).update(dict.fromkeys(("g", "byu"), function))
 
 
 def read_gms(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -> MeshArrays:
@@ -178,7 +178,7 @@ def read_gms(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     Raises:
         GeometryError: The file is cut off, has numbers left over or an index out of range.
     """
-    file = NumberFile.of(as_bytes(text), path, log, limits)
+    file = NumberFile.of(text_of(text, path, log), path, log, limits)
     n_vertices = file.count(0, "the number of vertices")
     vertices = file.points(1, n_vertices)
     first = 2 + 3 * n_vertices

@@ -15,7 +15,7 @@ from ...diagnostics import DiagnosticLog
 from ...errors import Span
 from ...limits import Limits
 from .numbers import find_numbers, span_of
-from .text import MeshArrays, NumberFile, as_bytes
+from .text import MeshArrays, NumberFile, text_of
 
 _CONTINUATION = re.compile(rb"\\(?:\r\n|\r|\n)")
 _LINE = re.compile(rb"^[ \t]*([^\s#]+)([^\n#]*)", re.MULTILINE)
@@ -85,7 +85,7 @@ def read_obj(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
     Raises:
         GeometryError: No vertices, no faces, a word that is not a finite number, an index out of range.
     """
-    whole = as_bytes(text)
+    whole = text_of(text, path, log)
     if b"\0" in whole:
         at = whole.index(b"\0")
         message = f"{path} is not a text file: it holds a NUL byte"

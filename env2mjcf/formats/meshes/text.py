@@ -19,12 +19,27 @@ from .polygons import triangulate
 MeshArrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 _BOM = b"\xef\xbb\xbf"
+# CP/M filled the last block of a text with 0x1A, others with zeros, and editors put line ends behind it.
+_FILLING = b"\x1a\0 \t\n\v\f\r"
 
 
-def as_bytes(text: str | bytes) -> bytes:
-    """Return the bytes of a file's text without a byte order mark."""
+def text_of(text: str | bytes, path: str, log: DiagnosticLog) -> bytes:
+    """Return the bytes of a file's text without a byte order mark, and without DOS's mark of the end, with a warning.
+
+    Args:
+        text: The content of the file.
+        path: The file, for messages.
+        log: Where findings go.
+    """
     data = text.encode("utf-8", "surrogateescape") if isinstance(text, str) else text
-    return data.removeprefix(_BOM)
+    data = data.removeprefix(_BOM)
+    kept = len(data.rstrip(_FILLING))
+    end = data.find(b"\x1a", kept)
+    if end < 0:
+        return data
+    message = f"{path} ends with DOS's mark of the end, the byte 0x1A; it is not read"
+    log.warn("GEO229", path, message, hint="remove it", span=span_of(path, data, end, end + 1))
+    return data[:end]
 
 
 class NumberFile:
