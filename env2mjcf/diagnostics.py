@@ -190,7 +190,7 @@ CATALOGUE: dict[str, str] = {
     "KIN311": "A closed loop is open at home; its equality is written, but inactive.",
     "KIN312": "Two bodies touch at home.",
     "KIN313": "Pairs that touch at home are not tested, as was asked for.",
-    "KIN315": "More pairs touch at home than are listed one by one.",
+    "KIN315": "More pairs touch at home, or may touch there, than are listed one by one.",
     "KIN320": "An SMAJoint cannot be converted.",
     # What is written for MuJoCo.
     "MJC401": "MuJoCo refuses a model.",

@@ -25,21 +25,19 @@ _FULL = [int(mujoco.mjtWarning.mjWARN_CONTACTFULL), int(mujoco.mjtWarning.mjWARN
 
 
 def new_data(model: mujoco.MjModel) -> mujoco.MjData:
-    """Return data whose warnings MuJoCo counts in silence.
+    """Return new data of a model.
 
     Raises:
         MemoryError: The system has no room for it.
     """
     try:
-        data = mujoco.MjData(model)
+        return mujoco.MjData(model)
     except (ValueError, mujoco.FatalError) as error:
         raise MemoryError(str(error)) from error
-    silence(data)
-    return data
 
 
 def silence(data: mujoco.MjData) -> None:
-    """Let MuJoCo count its warnings only: it prints, and writes to a file in the current folder, the first of a kind."""
+    """Let MuJoCo count its warnings only: else it prints the first of each kind, and writes it to a file."""
     np.maximum(data.warning.number, 1, out=data.warning.number)
 
 

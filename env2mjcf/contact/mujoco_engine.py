@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..pairs import Pair
 from ..transforms import Array
-from .arena import collide, collide_in_parts, new_data, restart
+from .arena import collide, collide_in_parts, new_data, restart, silence
 from .types import Contact, deepest
 
 
@@ -52,7 +52,9 @@ class MujocoEngine:
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
-        return new_data(self.model)
+        data = new_data(self.model)
+        silence(data)
+        return data
 
     def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
         """Return whether anything touches, (n,), for qpos of shape (n, nq)."""

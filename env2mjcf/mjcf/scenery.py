@@ -6,6 +6,7 @@ import itertools
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.assembly import Assembly, Part
 from ..model.environment import Boundary, Environment
@@ -54,19 +55,23 @@ for. Memory is not used, only reserved, until something touches."""
 _CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 32
 
 
+def possible_contacts(assembly: Assembly, pairs: PairTable, options: Options) -> NDArray[np.int64]:
+    """Return how many contacts each tested pair of bodies can have in MuJoCo, about and at most, (npairs,)."""
+    cells = {p.name: _cells(p, options) for p in assembly.parts()}
+    both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
+    a, b = both.T
+    return np.minimum(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * np.maximum(a, b))
+
+
 def memory(assembly: Assembly, pairs: PairTable, options: Options) -> int:
     """Return how many bytes MuJoCo needs for the contacts that a scene can have; 0 where its own choice will do.
 
     A contact has 0.6 kB, and four rows of forces of 0.25 kB and 24 bytes for each degree of freedom that it acts on.
     """
-    cells = {p.name: _cells(p, options) for p in assembly.parts()}
     motions = {n: r.kinematics.dim for r in assembly.robots for n in r.names}
-    needed = 0
-    for pair in pairs.tested:
-        a, b = cells[pair.link], cells[pair.other]
-        contacts = min(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * max(a, b))
-        moved = motions[pair.link] + (motions[pair.other] if pair.kind == "robot" else 0)
-        needed += contacts * (624 + 4 * (250 + 24 * moved))
+    moved = [motions[p.link] + (motions[p.other] if p.kind == "robot" else 0) for p in pairs.tested]
+    row = 250 + 24 * np.array(moved, dtype=np.int64)
+    needed = int(possible_contacts(assembly, pairs, options) @ (624 + 4 * row))
     if needed <= LEAST_MEMORY:
         return 0
     # What MuJoCo would choose, at most: its solver needs room, too.

@@ -6,11 +6,12 @@ import dataclasses
 from typing import Unpack
 
 import mujoco
+import numpy as np
 
-from ..contact.exact.engine import require
 from ..contact.arena import ROOM_HINT, lack, new_data
+from ..contact.exact.engine import require
 from ..diagnostics import DiagnosticLog
-from ..errors import counted
+from ..mjcf.scenery import possible_contacts
 from ..model.environment import Dialect, Environment
 from ..options import OptionKeywords, Options, PathArgument
 from ..pairs import Pair
@@ -18,9 +19,10 @@ from ..pipeline import Compiled, compile_scene, recompile
 from .mujoco_model import load_model
 from .scene import Scene
 
-
 # As many pairs that touch at home are named; there may be a million.
 _LISTED = 100
+# MuJoCo finds some hundred thousand contacts a second, and cannot be interrupted.
+_CROWD = 20_000_000
 
 
 def load(path: PathArgument, **options: Unpack[OptionKeywords]) -> Scene:
@@ -48,6 +50,11 @@ def prepare(source: PathArgument | Environment, options: Options, log: Diagnosti
     compiled = compile_scene(source, options, log)
     scene = _scene(compiled, log)
     # One look is not worth compiling the exact engine for.
+    crowd = _crowd_at_home(scene)
+    if crowd > _CROWD and not options.exclude_rest_contacts:
+        message = f"bodies that may touch at home could have {crowd} contacts there: what touches is not looked up"
+        log.warn("KIN315", scene.environment.name, message, hint="see Scene.touching_pairs(q), which may take hours")
+        return scene.with_diagnostics(tuple(log))
     touching = scene.touching_pairs(scene.space.home) if scene.link_names else []
     if touching and options.exclude_rest_contacts:
         names = [f"{p.link} and {p.other}" for p in touching[:_LISTED]]
@@ -69,6 +76,21 @@ def prepare(source: PathArgument | Environment, options: Options, log: Diagnosti
 def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
     model = load_model(compiled.document, compiled.assembly, log)
     return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
+
+
+def _crowd_at_home(scene: Scene) -> int:
+    """Return how many contacts there may be at home, of bodies whose bounding balls meet."""
+    compiled = scene.compiled
+    parts = {p.name: p for p in compiled.assembly.parts()}
+    poses = dict(zip(scene.link_names, scene.link_poses(scene.space.home), strict=True))
+    poses |= {p.name: p.pose for p in compiled.assembly.obstacles}
+    number = {name: i for i, name in enumerate(poses)}
+    places = np.array([pose[:3, 3] for pose in poses.values()]).reshape(-1, 3)
+    radii = np.array([parts[name].radius for name in poses])
+    pairs = compiled.pairs
+    first, second = np.array([(number[p.link], number[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2).T
+    meet = np.linalg.norm(places[first] - places[second], axis=1) <= radii[first] + radii[second]
+    return int(possible_contacts(compiled.assembly, pairs, compiled.options)[meet].sum())
 
 
 def _report_shortage(scene: Scene, log: DiagnosticLog) -> None:

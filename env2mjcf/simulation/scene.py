@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..contact.arena import lack, refuse
+from ..contact.arena import lack, new_data, refuse
 from ..contact.edges import even_rows
 from ..contact.queries import ContactQueries, joined
 from ..contact.tasks import Question
@@ -99,7 +99,7 @@ class Scene:
         """The scene's simulation state; at home at first."""
         with self._lock:
             if self._data is None:
-                data = mujoco.MjData(self.model)
+                data = new_data(self.model)
                 if self.model.nkey:
                     mujoco.mj_resetDataKeyframe(self.model, data, 0)
                 # Where its memory cannot hold home, as loading has reported, links are placed all the same.
