@@ -6,6 +6,7 @@ import dataclasses
 import os
 import re
 import sys
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,7 +15,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from .diagnostics import DiagnosticLog
-from .errors import Diagnostic, Env2MjcfError, GeometryError, Severity
+from .errors import Diagnostic, Env2MjcfError, GeometryError, Severity, one_line
 from .formats import xml_scene
 from .formats.detect import is_robot_file, is_xml
 from .formats.env import read_robot
@@ -35,6 +36,7 @@ from .system.files import open_regular
 # What is skipped is never tried in another way: comments could end at each of the marks behind their own.
 _ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
 _SCENE_TAGS = ("environment", *PROBLEM_TAGS)
+_MOST_SAID = 500
 _SNIFFED_BYTES = 1 << 16
 
 
@@ -98,11 +100,7 @@ def lint(
     bar = tqdm(files, unit="file", delay=1, leave=False, disable=not (progress and sys.stderr.isatty()))
     for file in bar:
         path, kind = file.path, _kind(file.path) if file.inside else Kind.OTHER
-        try:
-            found = dict.fromkeys(_lint_file(path, kind, chosen) if file.inside else [_leads_out(path)])
-        except Exception as error:
-            error.add_note(f"while linting {path}")
-            raise
+        found = dict.fromkeys(_lint_file(path, kind, chosen) if file.inside else [_leads_out(path)])
         # What has no place of its own belongs to the file; several scenes may well lack a robot.
         fresh = tuple(d for d in found if d.span is None or d not in seen)
         seen.update(fresh)
@@ -161,11 +159,25 @@ def _xml_kind(path: str) -> Kind:
     return Kind.ROBOT if tag == "robot" and b"<multibody" in start.lower() else Kind.OTHER
 
 
+FAULT = "MJC407"
+"""Code of the findings that are faults of env2mjcf or of the machine, and not of the file."""
+
+
+def _fault(path: str, error: Exception) -> Diagnostic:
+    """Return a finding of what must not happen, so that it hides none of the others."""
+    if isinstance(error, MemoryError):
+        return Diagnostic(FAULT, Severity.ERROR, path, f"there is not enough memory to look at {path}")
+    said = one_line(" ".join(traceback.format_exception_only(error)))
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    message = f"{path} could not be looked at: {said[:_MOST_SAID]} ({Path(where.filename).name}:{where.lineno})"
+    return Diagnostic(FAULT, Severity.ERROR, path, message, "a fault of env2mjcf: please report it with the file")
+
+
 def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
     log = DiagnosticLog()
     try:
         if kind is Kind.SCENE:
-            return _lint_scene(path, options)
+            return _lint_scene(path, options, log)
         if kind is Kind.ROBOT:
             _lint_robot(path, options, log)
         elif kind is Kind.MESH:
@@ -174,14 +186,15 @@ def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
             log.info("ENV132", path, f"{path} is XML, but neither a scene nor a robot; skipped")
     except Env2MjcfError as error:
         return error.diagnostics
+    except Exception as error:  # the other files, and what was found in this one, are worth telling
+        return *log, _fault(path, error)
     return tuple(log)
 
 
-def _lint_scene(path: str, options: Options) -> Sequence[Diagnostic]:
+def _lint_scene(path: str, options: Options, log: DiagnosticLog) -> Sequence[Diagnostic]:
     # Imported here because MuJoCo is slow to import, and robots and meshes do not need it.
     from .simulation.loading import prepare
 
-    log = DiagnosticLog()
     try:
         if is_robot_file(read_source(path, DiagnosticLog(), options.limits, regular=True)):
             _lint_robot(path, options, log)
@@ -207,6 +220,8 @@ def _lint_meshes(environment: Environment, options: Options, error: GeometryErro
             _lint_mesh(_resolved(environment, body, options, log), options, log, body)
         except Env2MjcfError as wrong:
             found += wrong.diagnostics
+        except Exception as wrong:
+            found += (*log, _fault(body.filename, wrong))
         else:
             found += log
     if any(d.severity is Severity.ERROR for d in found):

@@ -13,7 +13,7 @@ from tyro.conf import Positional
 from ..errors import Diagnostic, Severity, counted
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
-from .program import BAD_INPUT, DONE, FINDING
+from .program import BAD_INPUT, DONE, FAULT, FINDING
 from .terminal import console_on, one_line, print_diagnostic, print_json, printable, remark
 
 _GITHUB_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
@@ -25,7 +25,7 @@ class Lint:
 
     Folders are searched for .env, .robot and .xml files. An error in one file does not keep the others from being
     looked at. The exit status is 1 if there is an error; with --strict also if there is a warning; 3 if a path does not
-    exist.
+    exist; 4 if a fault of env2mjcf, or too little memory, ended the look at a file.
 
     Examples:
       env2mjcf lint scenes/
@@ -45,6 +45,7 @@ class Lint:
 
     def run(self) -> int:
         """Print all findings and a summary; 1 if there is an error, or in strict mode a warning; 3 without a path."""
+        from ..linting import FAULT as FAULT_CODE
         from ..linting import lint
 
         if not self.paths:
@@ -72,6 +73,8 @@ class Lint:
             remark("lint: no scene, robot or mesh was found")
         if not all(os.path.lexists(path) for path in self.paths):
             return BAD_INPUT  # what the error says
+        if any(d.code == FAULT_CODE for r in results for d in r.diagnostics):
+            return FAULT
         return FINDING if errors or (self.options.strict and warnings) else DONE
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..pairs import Pair
 from ..transforms import Array
+from .arena import collide, collide_in_parts, new_data, restart, silence
 from .types import Contact, deepest
 
 
@@ -35,6 +36,12 @@ class MujocoEngine:
         self._owner = np.full(model.ngeom, -1, dtype=np.int64)
         for geom, owner in owners.items():
             self._owner[model.geom(geom).id] = index[owner]
+        # Links collide with everything, obstacles only with them.
+        collides = (self._owner >= 0) & (model.geom_contype > 0)
+        self._links, self._obstacles = (
+            np.flatnonzero(collides & (model.geom_conaffinity > 0)),
+            np.flatnonzero(collides & (model.geom_conaffinity == 0)),
+        )
         self.model = copy.copy(model)
         self.model.geom_contype[self._owner < 0] = 0
         self.model.geom_conaffinity[self._owner < 0] = 0
@@ -45,34 +52,57 @@ class MujocoEngine:
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
-        return mujoco.MjData(self.model)
+        data = new_data(self.model)
+        silence(data)
+        return data
 
     def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
         """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
         model, kinematics, collision = self.model, mujoco.mj_kinematics, mujoco.mj_collision
         hits = np.zeros(len(qpos), dtype=bool)
+        full = data.warning[int(mujoco.mjtWarning.mjWARN_CONTACTFULL)]
         for i, row in enumerate(qpos):
             data.qpos[:] = row
             kinematics(model, data)
-            collision(model, data)
-            hits[i] = data.ncon > 0
+            before = full.number
+            try:
+                collision(model, data)
+                hits[i] = data.ncon > 0
+            except mujoco.FatalError:
+                restart(model, data)
+                before = -1
+            if not hits[i] and full.number != before:
+                hits[i] = any(each.ncon > 0 for each in self._found(row, data))
         return hits
 
-    def touching(self, qpos: Array, data: mujoco.MjData) -> Iterable[tuple[str, str, Array, Array, float]]:
-        """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
+    def _found(self, qpos: Array, data: mujoco.MjData) -> Iterator[mujoco.MjData]:
+        """Return data with all contacts of one qpos, at once or, where memory is too short for that, some at a time."""
         data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_collision(self.model, data)
-        if not data.ncon:
-            return []
-        # Iterating data.contact costs more than the query itself.
-        contacts = data.contact
-        geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos.copy()
-        distances = contacts.dist.copy()
-        return [
-            (self._names[self._owner[a]], self._names[self._owner[b]], places[i], frames[i, :3], float(distances[i]))
-            for i, (a, b) in enumerate(geoms)
-        ]
+        if not collide(self.model, data):
+            return iter((data,))
+        return collide_in_parts(self.model, data, self._links, self._obstacles)
+
+    def touching(self, qpos: Array, data: mujoco.MjData) -> Iterator[tuple[str, str, Array, Array, float]]:
+        """Return (body, body, position, normal from the first to the second, distance) of every contact of one qpos."""
+        for each in self._found(qpos, data):
+            if not each.ncon:
+                continue
+            # Iterating data.contact costs more than the query itself.
+            contacts = each.contact
+            geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos.copy()
+            distances = contacts.dist.copy()
+            for i, (a, b) in enumerate(geoms):
+                names = self._names[self._owner[a]], self._names[self._owner[b]]
+                yield *names, places[i], frames[i, :3], float(distances[i])
+
+    def touching_names(self, qpos: Array, data: mujoco.MjData) -> set[frozenset[str]]:
+        """Return the pairs of names of bodies that touch at one qpos."""
+        pairs: set[tuple[int, int]] = set()
+        for each in self._found(qpos, data):
+            if each.ncon:
+                pairs.update(map(tuple, np.unique(self._owner[each.contact.geom], axis=0).tolist()))
+        return {frozenset((self._names[a], self._names[b])) for a, b in pairs}
 
     def body_poses(self, qpos: Array, bodies: NDArray[np.int64], data: mujoco.MjData) -> Array:
         """Return world poses (n, nbodies, 4, 4) out of MuJoCo's kinematics for qpos of shape (n, nq)."""

@@ -50,7 +50,7 @@ def compile_mjcf(
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs))
     compilation.assets.plan([p.mesh for p in assembly.parts()])
     root = etree.Element("mujoco", model=plain(environment.name))
-    add_settings(root, assembly, options)
+    add_settings(root, assembly, pairs, options)
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")

@@ -6,10 +6,12 @@ import itertools
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.assembly import Assembly, Part
 from ..model.environment import Boundary, Environment
 from ..options import Options
+from ..pairs import PairTable
 from ..transforms import Array
 from .joints import STANDARD_GRAVITY
 from .markup import ASSET_FOLDER, Element, add, comment, number, numbers
@@ -45,7 +47,46 @@ def _thickness(part: Part) -> float:
     return max(float(np.min(np.ptp(used, axis=0))), part.mesh.diagonal / 20)
 
 
-def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
+LEAST_MEMORY, MOST_MEMORY = 8 << 20, 1 << 30
+"""Bytes of contacts and their forces: up to these MuJoCo's own choice of memory will do, and beyond those none is asked
+for. Memory is not used, only reserved, until something touches."""
+
+# Measured on shells pressed into each other: contacts of two cells, and of the cells of one body with another body.
+_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 32
+
+
+def possible_contacts(assembly: Assembly, pairs: PairTable, options: Options) -> NDArray[np.int64]:
+    """Return how many contacts each tested pair of bodies can have in MuJoCo, about and at most, (npairs,)."""
+    cells = {p.name: _cells(p, options) for p in assembly.parts()}
+    both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
+    a, b = both.T
+    return np.minimum(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * np.maximum(a, b))
+
+
+def memory(assembly: Assembly, pairs: PairTable, options: Options) -> int:
+    """Return how many bytes MuJoCo needs for the contacts that a scene can have; 0 where its own choice will do.
+
+    A contact has 0.6 kB, and four rows of forces of 0.25 kB and 24 bytes for each degree of freedom that it acts on.
+    """
+    motions = {n: r.kinematics.dim for r in assembly.robots for n in r.names}
+    moved = [motions[p.link] + (motions[p.other] if p.kind == "robot" else 0) for p in pairs.tested]
+    row = 250 + 24 * np.array(moved, dtype=np.int64)
+    needed = int(possible_contacts(assembly, pairs, options) @ (624 + 4 * row))
+    if needed <= LEAST_MEMORY:
+        return 0
+    # What MuJoCo would choose, at most: its solver needs room, too.
+    total = sum(r.kinematics.dim for r in assembly.robots)
+    needed += (16 << 20) + 36_000 * total + 72 * total * total
+    return min(1 << (needed - 1).bit_length(), MOST_MEMORY)
+
+
+def _cells(part: Part, options: Options) -> int:
+    if part.shape is None:
+        return 0
+    return 1 if options.primitives and part.analysis.box is not None else len(part.shape.pieces)
+
+
+def add_settings(root: Element, assembly: Assembly, pairs: PairTable, options: Options) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults."""
     add(root, "compiler", angle="radian", autolimits="true", meshdir=ASSET_FOLDER)
     gravity = options.acceleration(gravity_of_file(assembly.environment))
@@ -62,6 +103,9 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
     )
     option = add(root, "option", timestep=number(step), gravity=numbers(gravity), integrator="implicitfast")
     add(option, "flag", filterparent="disable")
+    asked = memory(assembly, pairs, options)
+    if asked:
+        add(root, "size", memory=f"{asked >> 20}M")
     center = (assembly.lower + assembly.upper) / 2
     add(root, "statistic", center=numbers(center), extent=number(assembly.extent))
     visual = add(root, "visual")

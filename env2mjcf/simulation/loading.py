@@ -5,14 +5,24 @@ from __future__ import annotations
 import dataclasses
 from typing import Unpack
 
+import mujoco
+import numpy as np
+
+from ..contact.arena import ROOM_HINT, lack, new_data
 from ..contact.exact.engine import require
-from ..contact.types import Contact, deepest
 from ..diagnostics import DiagnosticLog
+from ..mjcf.scenery import possible_contacts
 from ..model.environment import Dialect, Environment
 from ..options import OptionKeywords, Options, PathArgument
+from ..pairs import Pair
 from ..pipeline import Compiled, compile_scene, recompile
 from .mujoco_model import load_model
 from .scene import Scene
+
+# As many pairs that touch at home are named; there may be a million.
+_LISTED = 100
+# MuJoCo finds some hundred thousand contacts a second, and cannot be interrupted.
+_CROWD = 20_000_000
 
 
 def load(path: PathArgument, **options: Unpack[OptionKeywords]) -> Scene:
@@ -40,14 +50,26 @@ def prepare(source: PathArgument | Environment, options: Options, log: Diagnosti
     compiled = compile_scene(source, options, log)
     scene = _scene(compiled, log)
     # One look is not worth compiling the exact engine for.
-    touching = deepest(scene.contacts(scene.space.home, engine="mujoco")) if scene.link_names else ()
+    crowd = _crowd_at_home(scene)
+    if crowd > _CROWD and not options.exclude_rest_contacts:
+        message = f"bodies that may touch at home could have {crowd} contacts there: what touches is not looked up"
+        log.warn("KIN315", scene.environment.name, message, hint="see Scene.touching_pairs(q), which may take hours")
+        return scene.with_diagnostics(tuple(log))
+    touching = scene.touching_pairs(scene.space.home) if scene.link_names else []
     if touching and options.exclude_rest_contacts:
-        names = ", ".join(f"{c.link} and {c.other}" for c in touching)
-        log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {names}")
+        names = [f"{p.link} and {p.other}" for p in touching[:_LISTED]]
+        if len(touching) > _LISTED:
+            names.append(f"{len(touching) - _LISTED} more")
+        log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {', '.join(names)}")
         # The first compilation has reported everything else already.
-        return _scene(recompile(compiled, [(c.link, c.other) for c in touching], DiagnosticLog()), log)
-    for contact in touching:
-        _report_touching(compiled, contact, log)
+        compiled = recompile(compiled, [(p.link, p.other) for p in touching], DiagnosticLog())
+        scene, touching = _scene(compiled, log), []
+    for pair in touching[:_LISTED]:
+        _report_touching(compiled, pair, log)
+    if len(touching) > _LISTED:
+        message = f"{len(touching)} pairs of bodies touch at home, of which {_LISTED} are listed"
+        log.info("KIN315", scene.environment.name, message, hint="Scene.touching_pairs(q) returns all of them")
+    _report_shortage(scene, log)
     return scene.with_diagnostics(tuple(log))
 
 
@@ -56,10 +78,40 @@ def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
     return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
 
 
-def _report_touching(compiled: Compiled, contact: Contact, log: DiagnosticLog) -> None:
-    link, other = contact.link, contact.other
+def _crowd_at_home(scene: Scene) -> int:
+    """Return how many contacts there may be at home, of bodies whose bounding balls meet."""
+    compiled = scene.compiled
+    parts = {p.name: p for p in compiled.assembly.parts()}
+    poses = dict(zip(scene.link_names, scene.link_poses(scene.space.home), strict=True))
+    poses |= {p.name: p.pose for p in compiled.assembly.obstacles}
+    number = {name: i for i, name in enumerate(poses)}
+    places = np.array([pose[:3, 3] for pose in poses.values()]).reshape(-1, 3)
+    radii = np.array([parts[name].radius for name in poses])
+    pairs = compiled.pairs
+    first, second = np.array([(number[p.link], number[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2).T
+    meet = np.linalg.norm(places[first] - places[second], axis=1) <= radii[first] + radii[second]
+    return int(possible_contacts(compiled.assembly, pairs, compiled.options)[meet].sum())
+
+
+def _report_shortage(scene: Scene, log: DiagnosticLog) -> None:
+    """Report keys at which MuJoCo's memory cannot hold what touches."""
+    model = scene.model
+    if not model.nkey:
+        return
+    data = new_data(model)
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        said = lack(mujoco.mj_forward, model, data)
+        if said:
+            name = model.key(key).name
+            message = f"MuJoCo cannot hold all that touches at {name}, and cannot simulate from there: {said}"
+            log.warn("MJC405", scene.environment.name, message, hint=ROOM_HINT)
+
+
+def _report_touching(compiled: Compiled, pair: Pair, log: DiagnosticLog) -> None:
+    link, other = pair.link, pair.other
     body = next(p.body for p in compiled.assembly.parts() if p.name == link)
-    if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
+    if pair.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
         # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
         message = f"{link} and {other} touch at home, where the base is at the origin"
         hint = "" if compiled.environment.tasks else "give a query: simulations can begin at its start"

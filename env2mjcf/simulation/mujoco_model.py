@@ -14,6 +14,7 @@ from ..errors import Span
 from ..geometry.assembly import Assembly
 from ..mjcf.compiler import Document
 
+_NO_MEMORY = "Could not allocate memory"
 _QUOTED = re.compile(r"'([^']+)'")
 _LINE = re.compile(r"\bline (\d+)")
 _NAME = re.compile(r'\b(?:name|mesh|body1|geom1|joint)="([^"]+)"')
@@ -60,7 +61,11 @@ def _compiled(
         hint = "correct the scene, or do not have warnings raised (python -W error, PYTHONWARNINGS)"
         log.fail("MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}", hint=hint)
     except ValueError as error:
-        _refuse(" ".join(str(error).split()), document, assembly, log)
+        said = " ".join(str(error).split())
+        if _NO_MEMORY in said:
+            message = f"MuJoCo {mujoco.__version__} finds no room for {document.name}: {said}"
+            log.fail("MJC404", document.name, message, hint="close other programs, or make the scene smaller")
+        _refuse(said, document, assembly, log)
 
 
 def _refuse(message: str, document: Document, assembly: Assembly, log: DiagnosticLog) -> NoReturn:

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..contact.arena import lack, new_data, refuse
 from ..contact.edges import even_rows
 from ..contact.queries import ContactQueries, joined
 from ..contact.tasks import Question
@@ -25,6 +26,7 @@ from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
 from ..model.environment import Environment
 from ..options import Engine
+from ..pairs import Pair
 from ..pipeline import Compiled
 from ..report import Report, report
 from ..system.locks import Lock
@@ -97,10 +99,13 @@ class Scene:
         """The scene's simulation state; at home at first."""
         with self._lock:
             if self._data is None:
-                self._data = mujoco.MjData(self.model)
+                data = new_data(self.model)
                 if self.model.nkey:
-                    mujoco.mj_resetDataKeyframe(self.model, self._data, 0)
-                mujoco.mj_forward(self.model, self._data)
+                    mujoco.mj_resetDataKeyframe(self.model, data, 0)
+                # Where its memory cannot hold home, as loading has reported, links are placed all the same.
+                if lack(mujoco.mj_forward, self.model, data):
+                    mujoco.mj_kinematics(self.model, data)
+                self._data = data
             return self._data
 
     @property
@@ -169,12 +174,16 @@ class Scene:
 
         Raises:
             ValueError: q is not one configuration.
+            ConversionError: So much touches at q that MuJoCo's memory cannot hold it; links are there, all the same.
         """
         row = self.space.check_row(q)
         data = self.data
         data.qpos[:] = self.space.qpos(row)
         data.qvel[:] = 0
-        mujoco.mj_forward(self.model, data)
+        said = lack(mujoco.mj_forward, self.model, data)
+        if said:
+            mujoco.mj_kinematics(self.model, data)
+            refuse("this configuration", said)
 
     def q(self) -> Array:
         """Return the configuration that `data` holds, (dim,), in metres and radians."""
@@ -354,6 +363,16 @@ class Scene:
             ValueError: As for `explain`.
         """
         return self._solver.contacts(self.space.check_row(q), _known(engine))
+
+    def touching_pairs(self, q: ArrayLike) -> list[Pair]:
+        """Return the pairs of bodies that touch at one configuration, (dim,), as MuJoCo's engine says.
+
+        For non-convex bodies much quicker than `contacts`, which say where, and how deep.
+
+        Raises:
+            ValueError: q is not one configuration.
+        """
+        return self._solver.touching_pairs(self.space.check_row(q))
 
     def contacts_of_poses(self, poses: ArrayLike) -> list[Contact]:
         """Return the contacts of links placed by hand, whether or not any configuration puts them there.
