@@ -90,6 +90,11 @@ CATALOGUE: dict[str, str] = {
     "ENV181": "An XML file holds a text of more than ten million characters, or a name of more than fifty thousand.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
     "ENV183": "A boundary, or a limit of a joint, is too large to be computed with.",
+    # Tasks of several robots, and rules about pairs, of problem files.
+    "ENV184": "A group names an unknown robot, or a group task an unknown group.",
+    "ENV185": "A rule about pairs stands where it does not count, and is not followed.",
+    "ENV186": "A group task does not have a task for each robot of its group, or has one for another robot.",
+    "ENV187": "The robots of a group task visit different numbers of configurations; who is done waits at its goal.",
     # What a translation does not replace.
     "ENV190": "A file that is not an env file, robot file or query, or not of the scene that is replaced, is kept.",
     # Text files that are doubtful.
@@ -113,7 +118,7 @@ CATALOGUE: dict[str, str] = {
     "ENV218": "The header names a class whose configurations have a layout of their own.",
     "ENV219": "A fixed body of an XML file has no pose; it stands at the origin.",
     # What is worth knowing about text files.
-    "ENV301": "The pose of a later FreeBody of dialect A is not used.",
+    "ENV301": "The pose of a FreeBody of dialect A that a connection places is not used.",
     "ENV302": "A box with two ranges leaves z unbounded.",
     "ENV303": "DH angles are so large that they look like degrees where radians are read.",
     "ENV304": "A Prismatic connection slides, which the original planner never did.",
@@ -184,7 +189,7 @@ CATALOGUE: dict[str, str] = {
     "GEO276": "A mesh has coordinates that are too large to be computed with.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
-    "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",
+    "KIN302": "No connection leads to a later FreeBody of dialect A; it is a base of its own, at home at its own pose.",
     "KIN303": "Bodies hang in a cycle of connections that no base belongs to.",
     "KIN310": "A joint value of the file lies outside its limits; home has the nearest one inside.",
     "KIN311": "A closed loop is open at home; its equality is written, but inactive.",
@@ -226,6 +231,7 @@ CATALOGUE: dict[str, str] = {
     "CFG516": "The last configuration of a path file lacks poses of links.",
     "CFG517": "A path file holds poses of another number of links than the robot has.",
     "CFG518": "Recorded poses of links belong to no configuration of the robot.",
+    "CFG519": "A task has no start; it begins where the robot's task before it ends, else at its first goal.",
     "CFG520": "A roadmap has no graph.",
     "CFG521": "The counts of a roadmap are not whole numbers, or missing.",
     "CFG522": "A roadmap ends too early.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -132,6 +132,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def counted(count: int, what: str) -> str:
     """Return a number of things, in the plural where there is not one."""
     return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def robots_named(robots: Sequence[int]) -> str:
+    """Return `robot 0`, or `robots 0, 1, 2`; of more than twelve the first ones."""
+    return f"robot{'s' * (len(robots) > 1)} {', '.join(map(str, robots[:12]))}{', ...' * (len(robots) > 12)}"
 
 
 # Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.

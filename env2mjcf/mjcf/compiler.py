@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 
 from lxml import etree
 
@@ -97,8 +98,7 @@ def _header(assembly: Assembly, options: Options) -> str:
 def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
     """Append `home`, and `start` and `goal` where there is a task."""
     keys = {"home": space.home}
-    if tasks and len(tasks[0].configurations):
-        q = space.of_task(tasks[0])
+    for q in islice(space.of_tasks(tasks), 1):
         keys |= {"start": q[0], "goal": q[-1]}
     if not space.nq:
         return

@@ -13,6 +13,7 @@ from ..errors import Diagnostic, Env2MjcfError
 from ..formats.detect import detect
 from ..formats.env import read_robot
 from ..formats.lexer import Scanner
+from ..formats.reading import robot_dofs
 from ..formats.rows import number_lines, query_text
 from ..formats.source import Source, read_source
 from ..formats.writers import env_text, robot_text
@@ -137,7 +138,9 @@ def write_environment(
     placed, outside = named_from(out.parent, environment, options, log)
     companions = [Output(n, Kind.ROBOT, robot_text(m)) for n, m in zip(names, _apart(placed), strict=True)]
     if query is not None:
-        rows = query_text(environment.tasks, index=begins_with_robot(environment))
+        dofs = robot_dofs(environment, DiagnosticLog())
+        alone = [own for task in environment.tasks for own in task.of_each(dofs)]
+        rows = query_text(alone, index=begins_with_robot(environment))
         companions.append(Output(query, Kind.QUERY, rows))
     scene = Output(out, Kind.ENVIRONMENT, env_text(placed))
     refuse_foreign_outputs(scene, companions)
