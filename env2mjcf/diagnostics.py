@@ -13,9 +13,13 @@ from .errors import (
     ConversionError,
     Diagnostic,
     Env2MjcfError,
+    FolderGivenError,
+    ForbiddenFileError,
     FormatError,
     GeometryError,
     KinematicsError,
+    MissingFileError,
+    MissingMeshError,
     Severity,
     Span,
 )
@@ -202,7 +206,7 @@ CATALOGUE: dict[str, str] = {
     "MJC403": "A chain has more links than MuJoCo's XML parser reads within each other.",
     "MJC410": "A loop that closes by a slide stays open in the simulation.",
     "MJC411": "A free base gets no actuator.",
-    "MJC412": "An attribute of the environment concerns the planner, and is not written.",
+    "MJC412": "The gravity of the file is not used, or its friction not written.",
     "MJC413": "Controls and velocity bounds of a NonHolonomic robot are not written.",
     "MJC414": "A texture is not drawn.",
     "MJC415": "The boundary was to be drawn or built, and the scene has none.",
@@ -270,10 +274,19 @@ _CLASSES: dict[str, type[Env2MjcfError]] = {
 # What cannot be expressed, or not be written, although it was read.
 _NOT_EXPRESSED = {*(f"ENV{n}" for n in range(160, 180)), "ENV190", "KIN320"}
 _NOT_WRITTEN = {"CFG509", "CFG532", "CFG542", "CFG552", "CFG553"}
+# What Python has a class for, too.
+_OF_FILES: dict[str, type[Env2MjcfError]] = {
+    "ENV101": MissingFileError,
+    "ENV102": FolderGivenError,
+    "ENV103": ForbiddenFileError,
+    "GEO201": MissingMeshError,
+}
 
 
 def error_class(code: str) -> type[Env2MjcfError]:
     """Return the class of the error that is raised with a code."""
+    if code in _OF_FILES:
+        return _OF_FILES[code]
     return ConversionError if code in _NOT_EXPRESSED | _NOT_WRITTEN else _CLASSES[code[:3]]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -112,6 +113,47 @@ class FormatError(Env2MjcfError):
 
 class GeometryError(Env2MjcfError):
     """A mesh that is missing, unreadable or unusable."""
+
+
+class FileError(Env2MjcfError, OSError):
+    """A file that the system does not give: an `OSError`, too, of the kind that opening it would raise.
+
+    Attributes:
+        errno, filename: As of an `OSError`.
+    """
+
+    number: int
+
+    def __init__(self, diagnostic: Diagnostic, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        super().__init__(diagnostic, diagnostics)
+        self.errno, self.filename = self.number, diagnostic.subject
+
+    def __str__(self) -> str:
+        return str(self.diagnostic)
+
+
+class MissingFileError(FileError, FormatError, FileNotFoundError):
+    """A text file that does not exist."""
+
+    number = errno.ENOENT
+
+
+class FolderGivenError(FileError, FormatError, IsADirectoryError):
+    """A folder where a text file was expected."""
+
+    number = errno.EISDIR
+
+
+class ForbiddenFileError(FileError, FormatError, PermissionError):
+    """A text file that may not be read."""
+
+    number = errno.EACCES
+
+
+class MissingMeshError(FileError, GeometryError, FileNotFoundError):
+    """A mesh file that does not exist."""
+
+    number = errno.ENOENT
 
 
 class KinematicsError(Env2MjcfError):

@@ -135,7 +135,10 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
         message = "the boundary of the problem is not used: the environment has its own"
         log.info("ENV307", "<boundary>", message, span=problem.boundary.span)
     return dataclasses.replace(
-        environment, boundary=environment.boundary or problem.boundary, planner_rules=problem.rules
+        environment,
+        name=Path(source.path).stem,
+        boundary=environment.boundary or problem.boundary,
+        planner_rules=problem.rules,
     )
 
 

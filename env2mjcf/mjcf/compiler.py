@@ -22,9 +22,6 @@ from .loops import add_loops
 from .markup import Element, add, comment_text, numbers, plain, to_text
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file
 
-# Attributes of an <Environment> node that concern the planner's own simulation.
-_PHYSICS = ("gravity", "frictionCoefficient")
-
 
 @dataclass(frozen=True, slots=True)
 class Document:
@@ -113,13 +110,11 @@ def _report_unused(environment: Environment, options: Options, log: DiagnosticLo
     """Report textures, controls and physical attributes, which are kept and not written, and options without effect."""
     if options.boundary is not None and environment.boundary is None:
         log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
-    attributes = dict(environment.attributes)
-    for name in _PHYSICS:
-        followed = name == "gravity" and options.gravity is None and any(gravity_of_file(environment) or ())
-        if name in attributes and not followed:
-            message = f"{name}={attributes[name]!r} of the file is the planner's, and is not written"
-            hint = "give gravity=(x, y, z) (--gravity)" if name == "gravity" else ""
-            log.info("MJC412", name, message, hint=hint)
+    _report_gravity(environment, options, log)
+    friction = dict(environment.attributes).get("frictionCoefficient")
+    if friction is not None:
+        message = f"frictionCoefficient={friction!r} of the file is the planner's, and is not written"
+        log.info("MJC412", "frictionCoefficient", message)
     for multibody in environment.multibodies:
         if multibody.controls or multibody.velocity_bounds:
             message = f"{len(multibody.controls)} controls and the velocity bounds of the robot are kept, not written"
@@ -127,3 +122,20 @@ def _report_unused(environment: Environment, options: Options, log: DiagnosticLo
         for body in multibody.bodies:
             if body.texture is not None:
                 log.info("MJC414", body.filename, f"texture {body.texture!r} is kept, not drawn", span=body.span)
+
+
+def _report_gravity(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    """Say why the file's gravity is not used, where it is not."""
+    text, vector = dict(environment.attributes).get("gravity"), gravity_of_file(environment)
+    if text is None:
+        return
+    what, used = f"gravity={text!r} of the file", " ".join(f"{g:g}" for g in options.acceleration(vector))
+    hint = "give gravity=(x, y, z) (--gravity)"
+    if vector is None:
+        message = f"{what} is not three finite numbers, and not used; the MJCF has {used}"
+        log.warn("MJC412", "gravity", message, hint=hint)
+    elif options.gravity is not None:
+        log.info("MJC412", "gravity", f"{what} is overruled by the option; the MJCF has {used}")
+    elif not any(vector):
+        message = f"{what}, the planner's default, is not taken for weightlessness; the MJCF has {used}"
+        log.info("MJC412", "gravity", message, hint="give gravity=(0, 0, 0) (--gravity 0 0 0) if it is meant")
