@@ -145,6 +145,7 @@ def _read_labels(problem: Node) -> _Labels:
     for node in problem.children("RobotGroup"):
         label = node.get("label") or ""
         node.ignore_other_attributes("label", "robotLabels")
+        node.ignore_other_children()
         if label in labels.groups:
             message = f"two groups are called {label!r}; expected a label of its own for each"
             node.fail("ENV151", message, hint="group tasks name groups by their labels", at="label")
