@@ -1,4 +1,4 @@
-"""Write scenes of boxes, snakes and arms, the same at every run: meshes and env files of dialect D."""
+"""Write scenes of boxes, snakes and arms, the same at every run: meshes and env files, and problem files of groups."""
 
 from __future__ import annotations
 
@@ -87,6 +87,63 @@ def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
             _write_mesh(folder / name, trimesh.creation.box(rng.uniform(0.2, 0.6, 3)))
             placed.append(Placed(name, position, rng.uniform(-180, 180, 3)))
     return _scene(folder, "arm7", 9.0, robot, placed)
+
+
+def robots_in_groups(folder: Path, number: int) -> Case:
+    """Return a problem file of two to four boxes, with an arm or without, that move alone and in groups.
+
+    Starts and goals are drawn in one cube, in which three boxes stand: about half of them are free. Some robots have
+    several tasks and some none; robots of a group visit different numbers of configurations. The files lie in a folder
+    of their own.
+    """
+    folder = folder / f"groups{number}"
+    folder.mkdir(parents=True, exist_ok=True)
+    rng = np.random.default_rng((SEED, number))
+    count = int(rng.integers(2, 5))
+    bases = [str(rng.choice(list(_BASES))) for _ in range(count)]
+    arms = [bool(rng.integers(2)) for _ in range(count)]
+    problem = ['<Environment filename="scene.env"/>']
+    for i, (base, arm) in enumerate(zip(bases, arms, strict=True)):
+        sides = rng.uniform(0.3, 1.2, 3)
+        _write_mesh(folder / f"r{i}.g", trimesh.creation.box(sides))
+        robot = [str(1 + arm), f"r{i}.g {base}", *[f"r{i}.g Joint"] * arm, "Connections"]
+        half = f"{float(sides[0]) / 2 + 0.05!r} 0 0 0 0 0"
+        robot += [str(int(arm)), *["0 1 Revolute -1:1", f"{half}   0 0 0 0   {half}"] * arm]
+        (folder / f"r{i}.robot").write_text("\n".join(robot) + "\n", encoding="utf-8")
+        problem.append(f'<Robot label="r{i}" filename="r{i}.robot"/>')
+    for task in range(int(rng.integers(1, 4))):
+        members = rng.permutation(count)[: int(rng.integers(1, count + 1))]
+        steps = [
+            f'<Task label="t{task}" robot="r{i}">{_constraints(rng, _BASES[bases[i]], arms[i])}</Task>' for i in members
+        ]
+        if len(members) == 1:
+            problem += steps
+        else:
+            problem.append(f'<RobotGroup label="g{task}" robotLabels="{" ".join(f"r{i}" for i in members)}"/>')
+            problem += [f'<GroupTask label="t{task}" group="g{task}">', *steps, "</GroupTask>"]
+    lines = ["Boundary Box [-9:9 ; -9:9 ; -9:9]", "Multibodies", "3"]
+    for thing in _boxes(folder, 3, 6.0, 1000 + number):
+        lines += ["Passive", f"{thing.mesh} {' '.join(repr(float(x)) for x in (*thing.position, *thing.angles))}"]
+    (folder / "scene.env").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path = folder / f"groups{number}.xml"
+    text = "\n".join(["<MotionPlanning>", "<Problem>", *problem, "</Problem>", "</MotionPlanning>"])
+    path.write_text(text + "\n", encoding="utf-8")
+    return Case(path.stem, path)
+
+
+# How many lengths and angles place a base.
+_BASES = {"Volumetric Rotational": (3, 3), "Planar Rotational": (2, 1), "Planar Translational": (2, 0)}
+
+
+def _constraints(rng: np.random.Generator, base: tuple[int, int], arm: bool) -> str:
+    """Return a start and up to three goals of a robot."""
+
+    def point() -> str:
+        numbers = [*rng.uniform(-3, 3, base[0]), *rng.uniform(-1, 1, base[1] + arm)]
+        return f'<CSpaceConstraint point="{" ".join(repr(float(x)) for x in numbers)}"/>'
+
+    goals = "".join(point() for _ in range(int(rng.integers(1, 4))))
+    return f"<StartConstraints>{point()}</StartConstraints><GoalConstraints>{goals}</GoalConstraints>"
 
 
 def maze_copies(folder: Path, maze: Case, copies: int) -> Case:

@@ -13,9 +13,13 @@ from .errors import (
     ConversionError,
     Diagnostic,
     Env2MjcfError,
+    FolderGivenError,
+    ForbiddenFileError,
     FormatError,
     GeometryError,
     KinematicsError,
+    MissingFileError,
+    MissingMeshError,
     Severity,
     Span,
 )
@@ -90,6 +94,11 @@ CATALOGUE: dict[str, str] = {
     "ENV181": "An XML file holds a text of more than ten million characters, or a name of more than fifty thousand.",
     "ENV182": "A file has more configurations or nodes than `limits.rows`.",
     "ENV183": "A boundary, or a limit of a joint, is too large to be computed with.",
+    # Tasks of several robots, and rules about pairs, of problem files.
+    "ENV184": "A group names an unknown robot, or a group task an unknown group.",
+    "ENV185": "A rule about pairs stands where it does not count, and is not followed.",
+    "ENV186": "A group task does not have a task for each robot of its group, or has one for another robot.",
+    "ENV187": "The robots of a group task visit different numbers of configurations; who is done waits at its goal.",
     # What a translation does not replace.
     "ENV190": "A file that is not an env file, robot file or query, or not of the scene that is replaced, is kept.",
     # Text files that are doubtful.
@@ -113,7 +122,7 @@ CATALOGUE: dict[str, str] = {
     "ENV218": "The header names a class whose configurations have a layout of their own.",
     "ENV219": "A fixed body of an XML file has no pose; it stands at the origin.",
     # What is worth knowing about text files.
-    "ENV301": "The pose of a later FreeBody of dialect A is not used.",
+    "ENV301": "The pose of a FreeBody of dialect A that a connection places is not used.",
     "ENV302": "A box with two ranges leaves z unbounded.",
     "ENV303": "DH angles are so large that they look like degrees where radians are read.",
     "ENV304": "A Prismatic connection slides, which the original planner never did.",
@@ -187,7 +196,7 @@ CATALOGUE: dict[str, str] = {
     "GEO276": "A mesh has coordinates that are too large to be computed with.",
     # Bodies and connections.
     "KIN301": "No connection leads to a body that has no base.",
-    "KIN302": "No connection leads to a FreeBody of dialect A; it got a base of its own.",
+    "KIN302": "No connection leads to a later FreeBody of dialect A; it is a base of its own, at home at its own pose.",
     "KIN303": "Bodies hang in a cycle of connections that no base belongs to.",
     "KIN310": "A joint value of the file lies outside its limits; home has the nearest one inside.",
     "KIN311": "A closed loop is open at home; its equality is written, but inactive.",
@@ -204,7 +213,7 @@ CATALOGUE: dict[str, str] = {
     "MJC407": "A fault of env2mjcf, or too little memory, ended the look at one file.",
     "MJC410": "A loop that closes by a slide stays open in the simulation.",
     "MJC411": "A free base gets no actuator.",
-    "MJC412": "An attribute of the environment concerns the planner, and is not written.",
+    "MJC412": "The gravity of the file is not used, or its friction not written.",
     "MJC413": "Controls and velocity bounds of a NonHolonomic robot are not written.",
     "MJC414": "A texture is not drawn.",
     "MJC415": "The boundary was to be drawn or built, and the scene has none.",
@@ -234,6 +243,7 @@ CATALOGUE: dict[str, str] = {
     "CFG516": "The last configuration of a path file lacks poses of links.",
     "CFG517": "A path file holds poses of another number of links than the robot has.",
     "CFG518": "Recorded poses of links belong to no configuration of the robot.",
+    "CFG519": "A task has no start; it begins where the robot's task before it ends, else at its first goal.",
     "CFG520": "A roadmap has no graph.",
     "CFG521": "The counts of a roadmap are not whole numbers, or missing.",
     "CFG522": "A roadmap ends too early.",
@@ -272,10 +282,19 @@ _CLASSES: dict[str, type[Env2MjcfError]] = {
 # What cannot be expressed, or not be written, although it was read.
 _NOT_EXPRESSED = {*(f"ENV{n}" for n in range(160, 180)), "ENV190", "KIN320"}
 _NOT_WRITTEN = {"CFG509", "CFG532", "CFG542", "CFG552", "CFG553"}
+# What Python has a class for, too.
+_OF_FILES: dict[str, type[Env2MjcfError]] = {
+    "ENV101": MissingFileError,
+    "ENV102": FolderGivenError,
+    "ENV103": ForbiddenFileError,
+    "GEO201": MissingMeshError,
+}
 
 
 def error_class(code: str) -> type[Env2MjcfError]:
     """Return the class of the error that is raised with a code."""
+    if code in _OF_FILES:
+        return _OF_FILES[code]
     return ConversionError if code in _NOT_EXPRESSED | _NOT_WRITTEN else _CLASSES[code[:3]]
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -114,6 +115,47 @@ class GeometryError(Env2MjcfError):
     """A mesh that is missing, unreadable or unusable."""
 
 
+class FileError(Env2MjcfError, OSError):
+    """A file that the system does not give: an `OSError`, too, of the kind that opening it would raise.
+
+    Attributes:
+        errno, filename: As of an `OSError`.
+    """
+
+    number: int
+
+    def __init__(self, diagnostic: Diagnostic, diagnostics: Iterable[Diagnostic] = ()) -> None:
+        super().__init__(diagnostic, diagnostics)
+        self.errno, self.filename = self.number, diagnostic.subject
+
+    def __str__(self) -> str:
+        return str(self.diagnostic)
+
+
+class MissingFileError(FileError, FormatError, FileNotFoundError):
+    """A text file that does not exist."""
+
+    number = errno.ENOENT
+
+
+class FolderGivenError(FileError, FormatError, IsADirectoryError):
+    """A folder where a text file was expected."""
+
+    number = errno.EISDIR
+
+
+class ForbiddenFileError(FileError, FormatError, PermissionError):
+    """A text file that may not be read."""
+
+    number = errno.EACCES
+
+
+class MissingMeshError(FileError, GeometryError, FileNotFoundError):
+    """A mesh file that does not exist."""
+
+    number = errno.ENOENT
+
+
 class KinematicsError(Env2MjcfError):
     """Bodies and connections that do not make a robot."""
 
@@ -132,6 +174,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def counted(count: int, what: str) -> str:
     """Return a number of things, in the plural where there is not one."""
     return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def robots_named(robots: Sequence[int]) -> str:
+    """Return `robot 0`, or `robots 0, 1, 2`; of more than twelve the first ones."""
+    return f"robot{'s' * (len(robots) > 1)} {', '.join(map(str, robots[:12]))}{', ...' * (len(robots) > 12)}"
 
 
 # Control, format (among them the ones that turn the direction of text), surrogates, line and paragraph separators.

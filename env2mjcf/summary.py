@@ -56,11 +56,12 @@ class RobotSummary:
 
 @dataclass(frozen=True, slots=True)
 class QuerySummary:
-    """A task: which robot moves, and how many configurations it visits."""
+    """A task: which robots move (`robot` is the first), and how many configurations they visit."""
 
     robot: int
     label: str
     configurations: int
+    robots: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ def describe(environment: Environment, options: Options) -> SceneSummary:
         robots=tuple(_robots(environment, float(options.scale))),
         obstacles=_names_of(environment, environment.obstacles, names),
         surfaces=_names_of(environment, environment.surfaces, names),
-        queries=tuple(QuerySummary(t.robot, t.label, len(t.configurations)) for t in environment.tasks),
+        queries=tuple(QuerySummary(t.robot, t.label, len(t.configurations), t.robots) for t in environment.tasks),
     )
 
 

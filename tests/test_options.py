@@ -13,6 +13,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf import Options
 from env2mjcf.cli.main import main
+from env2mjcf.errors import Severity
 from env2mjcf.options import OptionKeywords
 
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
@@ -146,12 +147,40 @@ def test_gravity_is_the_files_unless_given_or_zero(problem: Path) -> None:
     assert gravity(gravity=(0, 0, 0)) == [0, 0, 0]
 
 
-@pytest.mark.parametrize("text", ["0 0 0", "", "down", "0 0", "0 0 nan", "1 2 3 4"])
+@pytest.mark.parametrize("text", ["0 0 0", "-0 0 0.0", "", "down", "0 0", "0 0 nan", "0 inf 0", "1 2 3 4", "0 0 1e31"])
 def test_gravity_that_is_zero_or_not_three_numbers_is_reported_and_not_used(problem: Path, text: str) -> None:
     problem.write_text(problem.read_text().replace("0 0 -32", text))
     scene = env2mjcf.load(problem, scale=0.5)
     assert scene.model.opt.gravity.tolist() == [0, 0, -9.81]
-    assert [d.subject for d in scene.diagnostics if d.code == "MJC412"] == ["gravity"]
+    (found,) = [d for d in scene.diagnostics if d.code == "MJC412"]
+    zero = text in ("0 0 0", "-0 0 0.0")
+    assert found.severity is (Severity.INFO if zero else Severity.WARNING)
+    assert ("planner's default" if zero else "not three finite numbers") in found.message
+    assert found.message.startswith(f"gravity={text!r} of the file")
+    assert found.message.endswith("the MJCF has 0 0 -9.81")
+
+
+@pytest.mark.parametrize("text", ["0 0 -32", "0 0 0", "down"])
+def test_gravity_that_an_option_overrules_is_not_called_the_planners(problem: Path, text: str) -> None:
+    problem.write_text(problem.read_text().replace("0 0 -32", text))
+    scene = env2mjcf.load(problem, gravity=(0, 1, -2))
+    assert scene.model.opt.gravity.tolist() == [0, 1, -2]
+    (found,) = [d for d in scene.diagnostics if d.code == "MJC412"]
+    assert "planner" not in found.message
+    assert found.message.endswith("the MJCF has 0 1 -2")
+
+
+def test_gravity_of_a_problem_overrules_that_of_its_environment(problem: Path) -> None:
+    xml = problem.with_name("scene.xml")
+    xml.write_text('<Environment gravity="1 2 3" frictionCoefficient="0.1"/>')
+    alone = env2mjcf.load(xml, scale=2.0)
+    assert alone.model.opt.gravity.tolist() == [2, 4, 6]
+    assert [d.subject for d in alone.diagnostics if d.code == "MJC412"] == ["frictionCoefficient"]
+    problem.write_text(problem.read_text().replace("scene.env", "scene.xml"))
+    both = env2mjcf.load(problem)
+    assert both.model.opt.gravity.tolist() == [0, 0, -32]
+    problem.write_text(problem.read_text().replace(' gravity="0 0 -32"', ""))
+    assert env2mjcf.load(problem).model.opt.gravity.tolist() == [1, 2, 3]
 
 
 def test_without_a_problem_file_the_defaults_hold(tmp_path: Path) -> None:

@@ -45,6 +45,14 @@ CHANGED: dict[str, str] = {
         ("names/env2mjcf/Scene/methods/step", "instances/Scene/step"),
         "now `resolution`: in a class about MuJoCo `step` would step physics",
     ),
+    **dict.fromkeys(
+        ("names/env2mjcf/ConfigurationSpace/methods/of_task", "instances/ConfigurationSpace/of_task"),
+        "now `of_tasks`: where the robots of one task stand in another takes all of them",
+    ),
+    **dict.fromkeys(
+        ("names/env2mjcf.model/Task/fields", "names/env2mjcf.model/Task/constructor/parameters"),
+        "a task has several `robots`, of which `robot` is the first",
+    ),
 }
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ..errors import robots_named
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
 from .terminal import one_line
@@ -37,7 +38,7 @@ def text_part(scene: SceneSummary) -> Iterator[RenderableType]:
     if scene.surfaces:
         rows.append(("surfaces", f"{_list(scene.surfaces)} (drawn, never touched)"))
     rows += [
-        ("query", f"robot {q.robot}: {q.configurations} configurations{f', {q.label}' if q.label else ''}")
+        ("query", f"{robots_named(q.robots)}: {q.configurations} configurations{f', {q.label}' if q.label else ''}")
         for q in scene.queries
     ]
     yield _facts(rows)

@@ -29,10 +29,12 @@ if TYPE_CHECKING:
 class Plan:
     """Plan a way from the start to the goal of a query, and write it as a path file.
 
-    The robot of the query moves, the others stay at home. A query of more than two configurations is planned leg by
-    leg. A solution is made shorter, and each of its edges is looked at in fine steps and, wherever it keeps 1e-5 of the
-    scene's extent away from everything, proved to be free. The path file holds configurations no farther apart than
-    the resolution, corners included, so that it plays smoothly; --corners writes just the corners.
+    The robots of the query move, together if there are several; the others stay at the starts of their own queries, or
+    at home. A query of more than two configurations is planned leg by leg. A solution is made shorter, and each of its
+    edges is looked at in fine steps and, wherever it keeps 1e-5 of the scene's extent away from everything, proved to
+    be free. The path file holds configurations no farther apart than the resolution, corners included, so that it plays
+    smoothly; --corners writes just the corners. It has the numbers of all robots where several move, or others stand
+    elsewhere than at home.
 
     Without a solution in time the exit status is 1, and the best approach, from the start to what came nearest to the
     goal, is written beside the output: out.approach.path for out.path. A start or goal that is not valid is a finding,
@@ -97,10 +99,10 @@ class Plan:
 
         with planning_meter(self.time) as progress:
             result = plan_through(
-                scene, query.q, planner=self.planner, robot=query.robot, time=self.time, seed=self.seed,
+                scene, query.q, planner=self.planner, robot=query.robots, time=self.time, seed=self.seed,
                 resolution=self.resolution, shorten=self.shorten, progress=progress,
             )  # fmt: skip
-        written = self._write(scene, query.robot, result)
+        written = self._write(scene, query, result)
         if self.output.json:
             print_json({**_summary(scene, result, written), "diagnostics": tuple(log)})
         else:
@@ -130,14 +132,15 @@ class Plan:
             log.fail("CFG541", self.scene, "the task holds one configuration; expected a start and a goal", hint=hint)
         return task
 
-    def _write(self, scene: Scene, robot: int, result: Result) -> Path | None:
+    def _write(self, scene: Scene, query: Query, result: Result) -> Path | None:
         from ..companions import write_path
+        from ..planning.route import alone
 
         if self.out is None:
             return None
         out = Path(self.out) if result.solved else _approach(Path(self.out))
         q = result.path if self.corners else result.steps(scene)
-        return write_path(scene, q, out, robot)
+        return write_path(scene, q, out, query.robot if alone(scene, query) else None)
 
     def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
         if self.output.json:

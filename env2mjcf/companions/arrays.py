@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
+from ..formats.source import read_source
 from ..kinematics.space import ConfigurationSpace, listed
-from ..limits import LARGEST
+from ..limits import LARGEST, Limits
 from ..transforms import Array
 
 _WHAT_TO_DO = "write it with numpy.save(path, array), an array of floats of shape (n, {dim})"
@@ -62,8 +63,7 @@ def open_rows(path: str, space: ConfigurationSpace, file_units: bool) -> MappedR
     """
     log, hint = DiagnosticLog(), _WHAT_TO_DO.format(dim=space.dim)
     if not Path(path).is_file():
-        what = "is a folder" if Path(path).is_dir() else "does not exist"
-        log.fail("CFG505", path, f"{path} {what}; expected a NumPy file of configurations", hint=hint)
+        read_source(path, log, Limits(), regular=True)  # says what is wrong
     rows = map_array(path, log, hint)
     if rows.ndim != 2 or rows.shape[1] != space.dim:
         if rows.shape == (space.dim,):

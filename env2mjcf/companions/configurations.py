@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import DiagnosticLog
+from ..errors import robots_named
 from ..formats.path import is_path
 from ..formats.roadmap import is_roadmap
 from ..formats.rows import read_query
 from ..formats.source import Source, read_source
 from ..limits import Limits
-from ..model.environment import Task
 from ..options import PathArgument
 from ..simulation.edge_verdicts import Edges
-from ..simulation.scene import Query, Scene
+from ..simulation.scene import Query, Scene, queries_of
 from ..transforms import Array
 from .paths import path_record
-from .query_files import dofs_of
+from .query_files import dofs_of, standing
 from .records import Configurations, Graph, Poses, expected, joined, of_array, of_text, row_of
 from .roadmaps import roadmap_record, ways_between
 
@@ -37,8 +37,8 @@ def read_configurations(
     """Read the configurations that a file of any kind holds.
 
     A NumPy file (.npy) or a text of rows (.csv, .txt) holds metres and radians: a row of all robots, or of one behind
-    its index, the others at home. A path (.path), the nodes of a roadmap (.map), or else a query, is in the units of
-    its own format; they are known by their text, whatever their names are.
+    its index, the others at the start of their query, else at home. A path (.path), the nodes of a roadmap (.map), or
+    else a query, is in the units of its own format; they are known by their text, whatever their names are.
 
     Args:
         path: The file.
@@ -77,7 +77,7 @@ def of_numbers(scene: Scene, words: Sequence[str], radians: bool) -> Configurati
             numbers.append(float(word))
         except ValueError:
             raise ValueError(f"{word!r} is not a number; expected numbers, or one file") from None
-    q = row_of(scene, numbers, radians)
+    q = row_of(scene, numbers, radians, standing(scene))
     if q is None:
         raise ValueError(f"{len(numbers)} numbers; expected {expected(scene)}")
     return Configurations(q[None], ("configuration",))
@@ -121,8 +121,8 @@ def _of_file(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
             raise ValueError("--radians is for plain numbers; paths and roadmaps are in units of their own")
         return reader(scene, source, log)
     tasks = read_query(source, dofs_of(scene), log)
-    rows = [Query(t.robot, _task_q(scene, t, radians), t.label) for t in tasks]
-    return joined(scene, list(_task_rows(scene, rows)))
+    queries = queries_of(scene.space, tasks, standing(scene), radians=radians)
+    return joined(scene, list(_task_rows(scene, queries)))
 
 
 def _graph_reader(source: Source, extension: str) -> Callable[[Scene, Source, DiagnosticLog], Configurations] | None:
@@ -134,18 +134,11 @@ def _graph_reader(source: Source, extension: str) -> Callable[[Scene, Source, Di
     return {".path": of_path, ".map": of_roadmap}.get(extension)
 
 
-def _task_q(scene: Scene, task: Task, radians: bool) -> Array:
-    q = scene.space.of_task(task)
-    if radians:
-        q[:, scene.space.robot_slices[task.robot]] = task.configurations
-    return q
-
-
 def _task_rows(scene: Scene, queries: Sequence[Query]) -> Iterator[tuple[str, Array]]:
     several = len(scene.space.robot_slices) > 1
     for query in queries:
         task = f"{query.label}, " if query.label else ""
-        robot = f"robot {query.robot}, " if several else ""
+        robot = f"{robots_named(query.robots)}, " if several else ""
         for n, row in enumerate(query.q, 1):
             yield f"{task}{robot}configuration {n} of {len(query.q)}", row
 

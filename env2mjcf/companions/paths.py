@@ -20,7 +20,7 @@ from ..model.environment import BaseKind, Dialect
 from ..options import PathArgument
 from ..simulation.scene import Scene
 from ..transforms import Array, pose_gaps, rotation_matrix, transform
-from .query_files import configurations, dofs_of, file_numbers, from_turns, write
+from .query_files import configurations, dofs_of, file_numbers, from_turns, standing, write
 
 # What the planner divided angles by to write turns: its files fit twice as well as with 2 pi.
 _TURN = 6.2832
@@ -35,7 +35,7 @@ class PathRecord:
     Attributes:
         file: Its name.
         version: Of the format, such as 2012.
-        q: (k, dim) configurations in metres and radians, the other robots at home.
+        q: (k, dim) configurations in metres and radians; other robots stand at the start of their query, else at home.
         robots: (k,) index of the robot that each belongs to; -1 for all at once.
         lines: (k,) line of the file that each begins on.
         poses: (k, nlinks, 4, 4) world poses of all links, where the file holds poses; else None. `q` is recovered
@@ -102,7 +102,7 @@ def path_record(scene: Scene, source: Source, log: DiagnosticLog) -> PathRecord:
     return PathRecord(source.path, found.version, q, robots, lines, None, none, none == 0, tuple(log))
 
 
-def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -> Path:
+def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int | None = 0) -> Path:
     """Write a path as the newest planner reads it, whole or not at all; for dialect A, as its viewer did.
 
     Numbers have 17 digits: reading them back gives the same doubles for lengths, and for angles that were read from a
@@ -112,7 +112,7 @@ def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -
         scene: Whose path it is.
         q: (k, dim) configurations in metres and radians.
         file: The file to write; replaced if it exists.
-        robot: Whose numbers are written.
+        robot: Whose numbers are written; None writes those of all robots, behind a 0 where rows have an index.
 
     Raises:
         ConversionError: The file cannot be written.
@@ -121,7 +121,7 @@ def write_path(scene: Scene, q: ArrayLike, file: PathArgument, robot: int = 0) -
     """
     rows = file_numbers(scene, q, robot)
     version = text.TURNS if scene.environment.dialect is Dialect.A else text.CURRENT
-    index = robot if begins_with_robot(scene.environment) else None
+    index = (robot or 0) if begins_with_robot(scene.environment) else None
     return write(file, text.path_text(rows, version, index))
 
 
@@ -141,10 +141,11 @@ def _of_poses(scene: Scene, source: Source, found: text.PathFile, numbers: Array
     recorded = transform(rotation_matrix(*np.moveaxis(angles, -1, 0)), scale * numbers[..., :3])
     k, n = len(recorded), len(robot.links)
     # Links of robot 0 come first.
-    poses = np.tile(scene.link_poses(scene.space.home), (k, 1, 1, 1))
+    rest = standing(scene)
+    poses = np.tile(scene.link_poses(rest), (k, 1, 1, 1))
     moving = [i for i, b in enumerate(robot.kinematics.multibody.bodies) if b.base is not BaseKind.FIXED]
     poses[:, list(range(n)) if recorded.shape[1] == n else moving] = recorded
-    q = np.tile(scene.space.home, (k, 1))
+    q = np.tile(rest, (k, 1))
     q[:, scene.space.robot_slices[0]] = configuration_of_poses(robot.kinematics, poses[:, :n])
     radii = np.array([p.radius for p in robot.links])
     errors = pose_gaps(scene.link_poses(q)[:, :n], poses[:, :n], radii).max(axis=1, initial=0.0)

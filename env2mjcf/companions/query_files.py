@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Span
+from ..errors import Span, counted
 from ..formats import rows as text
 from ..formats.path import ALL_ROBOTS
 from ..formats.source import read_source
@@ -19,7 +19,7 @@ from ..limits import LARGEST, Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Dialect, Task
 from ..options import PathArgument, whole
-from ..simulation.scene import Query, Scene
+from ..simulation.scene import Query, Scene, queries_of
 from ..system.files import output
 from ..transforms import Array
 
@@ -36,18 +36,21 @@ def read_query(
         strict: Whether warnings are errors.
 
     Returns:
-        One query for each robot that has configurations, the other robots at home.
+        One query for each robot that has configurations. Other robots stand at the start of their own, or at that of
+        the scene's own queries, else at home.
 
     Raises:
         FormatError: The file cannot be read, or a row fits no robot.
     """
     log = DiagnosticLog(strict)
     tasks = text.read_query(read_source(file, log, limits or Limits()), dofs_of(scene), log)
-    return tuple(Query(t.robot, scene.space.of_task(t), t.label) for t in tasks)
+    return queries_of(scene.space, tasks, standing(scene))
 
 
 def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgument) -> Path:
-    """Write a query file, each query's own robot only, in the dialect of the scene, whole or not at all.
+    """Write a query file, each query's own robots only, in the dialect of the scene, whole or not at all.
+
+    The file has a row for each robot: it does not say which robots move together.
 
     Args:
         scene: Whose configurations they are.
@@ -62,8 +65,13 @@ def write_query(scene: Scene, queries: Query | Sequence[Query], file: PathArgume
     listed = [queries] if isinstance(queries, Query) else list(queries)
     if not any(len(q.q) for q in listed):
         raise ValueError("queries hold no configuration; expected a start and a goal")
-    tasks = [Task(q.robot, tuple(map(tuple, file_numbers(scene, q.q, q.robot)))) for q in listed]
+    tasks = [Task((r,), tuple(map(tuple, file_numbers(scene, q.q, r)))) for q in listed for r in q.robots]
     return write(file, text.query_text(tasks, index=begins_with_robot(scene.environment)))
+
+
+def standing(scene: Scene) -> Array:
+    """Return where robots stand of which a file says nothing, (dim,): at the start of their query, or at home."""
+    return scene.space.standing(scene.environment.tasks)
 
 
 def dofs_of(scene: Scene) -> list[int]:
@@ -72,9 +80,9 @@ def dofs_of(scene: Scene) -> list[int]:
 
 
 def configurations(scene: Scene, rows: Sequence[tuple[int, Sequence[float]]]) -> Array:
-    """Return rows (robot, its numbers in the file) as (n, dim), the other robots at home."""
+    """Return rows (robot, its numbers in the file) as (n, dim), with the other robots `standing`."""
     space = scene.space
-    q = np.tile(space.home, (len(rows), 1))
+    q = np.tile(standing(scene), (len(rows), 1))
     for robot in {r for r, _ in rows}:
         columns = slice(0, space.dim) if robot == ALL_ROBOTS else space.robot_slices[robot]
         own = [i for i, (r, _) in enumerate(rows) if r == robot]
@@ -101,8 +109,8 @@ def from_turns(
     return [(r, [x * f for x, f in zip(row, factors[r], strict=True)]) for r, row in rows]
 
 
-def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
-    """Return one robot's numbers of configurations (n, dim) as they are written.
+def file_numbers(scene: Scene, q: ArrayLike, robot: int | None) -> list[list[float]]:
+    """Return one robot's numbers of configurations (n, dim) as they are written; for None those of all robots.
 
     Decoding them gives q again to the last bit wherever some number does; else it is one unit of the last digit off,
     because not every double is a multiple of pi.
@@ -113,9 +121,10 @@ def file_numbers(scene: Scene, q: ArrayLike, robot: int) -> list[list[float]]:
     """
     space = scene.space
     count = len(space.robot_slices)
-    if not 0 <= whole("robot", robot, 0) < count:
-        raise ValueError(f"robot={robot}; the scene has {count} robot{'' if count == 1 else 's'}, counted from 0")
-    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, space.robot_slices[robot]]
+    if robot is not None and not 0 <= whole("robot", robot, 0) < count:
+        raise ValueError(f"robot={robot}; the scene has {counted(count, 'robot')}, counted from 0")
+    columns = slice(None) if robot is None else space.robot_slices[robot]
+    numbers = _exactly(space, np.atleast_2d(space.check(q)))[:, columns]
     if (np.abs(numbers) > LARGEST).any():
         raise ValueError(f"q holds {np.abs(numbers).max():g} in the file's units; files hold numbers up to {LARGEST:g}")
     return numbers.tolist()

@@ -19,7 +19,7 @@ from ..simulation.edge_verdicts import Edges
 from ..simulation.scene import Scene
 from ..transforms import Array
 from .arrays import coordinates, map_array
-from .query_files import dofs_of
+from .query_files import dofs_of, standing
 
 _WORD = re.compile(r"[^,;\s]+")
 
@@ -81,8 +81,11 @@ def joined(scene: Scene, rows: Sequence[tuple[str, Array]]) -> Configurations:
     return Configurations(q, tuple(label for label, _ in rows))
 
 
-def row_of(scene: Scene, numbers: Sequence[float], radians: bool) -> Array | None:
-    """Return the configuration that some numbers mean: a full row of all robots first, else one robot's."""
+def row_of(scene: Scene, numbers: Sequence[float], radians: bool, rest: Array) -> Array | None:
+    """Return the configuration that some numbers mean: a full row of all robots first, else one robot's.
+
+    The others stand as in `rest`, (dim,).
+    """
     space = scene.space
     if len(numbers) == space.dim:
         return np.array(numbers) if radians else space.decode(numbers)
@@ -93,7 +96,7 @@ def row_of(scene: Scene, numbers: Sequence[float], radians: bool) -> Array | Non
     columns = space.robot_slices[robot]
     given = np.zeros(space.dim)
     given[columns] = values
-    q = space.home.copy()
+    q = rest.copy()
     q[columns] = (given if radians else space.decode(given))[columns]
     return q
 
@@ -127,9 +130,9 @@ def of_array(scene: Scene, path: str, radians: bool, limits: Limits, log: Diagno
     if rows.shape[1] == scene.space.dim:
         q = rows if radians else scene.space.decode(rows)
         return Configurations(q, tuple(f"row {i}" for i in range(len(rows))))
-    found: list[tuple[str, Array]] = []
+    rest, found = standing(scene), list[tuple[str, Array]]()
     for i, numbers in enumerate(rows.tolist()):
-        row = row_of(scene, numbers, radians)
+        row = row_of(scene, numbers, radians, rest)
         if row is None:
             log.fail("CFG504", path, f"row {i} has {len(numbers)} numbers; expected {expected(scene)}")
         found.append((f"row {i}", row))
@@ -142,7 +145,7 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
     Raises:
         FormatError: A word is not a finite number, or a row fits no robot.
     """
-    found: list[tuple[str, Array]] = []
+    rest, found = standing(scene), list[tuple[str, Array]]()
     rows = (
         (line, start, list(_WORD.finditer(text.split("#", maxsplit=1)[0])))
         for line, (start, text) in enumerate(source.lines(), 1)
@@ -156,7 +159,7 @@ def of_text(scene: Scene, source: Source, radians: bool, log: DiagnosticLog) -> 
             message = f"expected a row of finite numbers, found {wrong.group()[:60]!r}"
             span = source.span(start + wrong.start(), start + wrong.end())
             log.fail("CFG502", source.path, message, hint=coordinate_hint(wrong.group()), span=span)
-        row = row_of(scene, [x for x in numbers if x is not None], radians)
+        row = row_of(scene, [x for x in numbers if x is not None], radians, rest)
         if row is None:
             message = f"a row of {len(words)} numbers; expected {expected(scene)}"
             log.fail("CFG504", source.path, message, span=source.line_span(line))

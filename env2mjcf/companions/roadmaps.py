@@ -39,7 +39,7 @@ class Roadmap:
     `Roadmap.of` makes one out of nodes and edges alone.
 
     Attributes:
-        q: (n, dim) nodes in metres and radians, the other robots at home.
+        q: (n, dim) nodes in metres and radians; other robots stand at the start of their query, else at home.
         edges: (m, 2) indices into `q`; in what was read, the lower one first, and in order.
         weights: (m,) lengths as the planner measured them.
         intermediates: For each edge its (k, dim) configurations on the way from `edges[i, 0]` to `edges[i, 1]`, both

@@ -49,9 +49,6 @@ def read_legacy_body(scan: Scanner, rules: DialectRules, first: bool) -> Body:
     index = scan.integer("the index of the body")
     filename = scan.word("a mesh file", whole=True)
     pose = read_pose(scan, rules) if not free or scan.next_is_number() else None
-    if free and not first and pose is not None:
-        message = "only the first FreeBody of a robot has a pose; this one is not used"
-        scan.log.info("ENV301", filename.text, message, span=pose.span)
     free_base = BaseKind.VOLUMETRIC_ROTATIONAL if first else BaseKind.JOINT
     span = scan.source.span(filename.start, filename.end)
     base = free_base if free else BaseKind.FIXED

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import did_you_mean
 from ..model.dialects import DialectRules
-from ..model.environment import Body, Dialect, MultiBody, MultiBodyKind, VelocityBounds
+from ..model.environment import BaseKind, Body, Connection, Dialect, MultiBody, MultiBodyKind, VelocityBounds
 from .blocks import is_multibody_tag, read_counted
 from .bodies import (
     read_body_index,
@@ -60,6 +61,8 @@ def read_linked_bodies(scan: Scanner, rules: DialectRules) -> MultiBody:
     bodies = read_counted(scan, "body", "bodies", read_body, lambda expected: follows(scan, expected), required=True)
     adjacencies = () if rules.legacy_layout else _read_adjacencies(scan, len(bodies))
     connections = read_connections(scan, rules, len(bodies))
+    if rules.legacy_layout:
+        _report_poses(scan, bodies, connections)
     return MultiBody(
         MultiBodyKind.ACTIVE,
         bodies,
@@ -69,6 +72,15 @@ def read_linked_bodies(scan: Scanner, rules: DialectRules) -> MultiBody:
         adjacencies=adjacencies,
         span=span,
     )
+
+
+def _report_poses(scan: Scanner, bodies: Sequence[Body], connections: Sequence[Connection]) -> None:
+    """Report poses of FreeBodies that connections place; without one, the pose is where the body is at home."""
+    for index in sorted({c.next for c in connections}):
+        body = bodies[index]
+        if body.base is BaseKind.JOINT and body.pose is not None:
+            message = f"a connection places FreeBody {index} ({body.filename}); its own pose is not used"
+            scan.log.info("ENV301", body.filename, message, span=body.pose.span)
 
 
 def _legacy_body_follows(scan: Scanner, expected: bool) -> bool:

@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Unpack
 
@@ -20,10 +21,12 @@ from . import xml_scene
 from .detect import detect, is_xml
 from .env import read_env, read_robot
 from .lexer import Scanner
-from .problem import PROBLEM_TAGS, Problem, ProblemTask, read_problem
+from .problem import PROBLEM_TAGS, Problem, ProblemPart, ProblemTask, read_problem
 from .rows import read_query, split_row
 from .source import Source, read_source
 from .xml import Node, parse_xml
+
+_Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +131,14 @@ def _problem_environment(problem: Problem, source: Source, options: Options, log
         else:
             environment = _text_environment(inner, options, log)
         environment = xml_scene.with_environment_attributes(environment, node)
+    if environment.boundary is not None and problem.boundary is not None:
+        message = "the boundary of the problem is not used: the environment has its own"
+        log.info("ENV307", "<boundary>", message, span=problem.boundary.span)
     return dataclasses.replace(
-        environment, boundary=environment.boundary or problem.boundary, planner_rules=problem.rules
+        environment,
+        name=Path(source.path).stem,
+        boundary=environment.boundary or problem.boundary,
+        planner_rules=problem.rules,
     )
 
 
@@ -204,19 +213,46 @@ def _tasks(
     tasks: list[Task] = []
     if problem is not None:
         robots = {r.label: first_robot + i for i, r in enumerate(problem.robots)}
-        tasks += [_problem_task(t, robots[t.robot], dofs) for t in problem.tasks]
+        ended: dict[int, _Numbers] = {}
+        tasks += [_problem_task(t, robots, dofs, ended) for t in problem.tasks]
     if options.query is not None:
         tasks += read_query(read_source(options.query, log, options.limits), dofs, log)
     return tuple(tasks)
 
 
-def _problem_task(task: ProblemTask, robot: int, dofs: list[int]) -> Task:
-    configurations: list[tuple[float, ...]] = []
-    for row in task.rows:
-        taken = split_row(row, dofs[robot : robot + 1])
-        if taken is None:
-            found = f"a point of {len(row)} numbers in task {task.label!r}"
-            message = f"{found}; expected {dofs[robot]}, the degrees of freedom of robot {task.robot!r}"
-            task.node.fail("CFG504", message, hint="is the task meant for another robot?")
-        configurations.append(taken[1])
-    return Task(robot, tuple(configurations), task.label, task.node.span)
+def _problem_task(task: ProblemTask, robots: dict[str, int], dofs: list[int], ended: dict[int, _Numbers]) -> Task:
+    """Return a task; in `ended` are the goals of the robots' tasks before it, and then its own."""
+    columns: list[list[_Numbers]] = []
+    for part in task.parts:
+        robot = robots[part.robot]
+        rows = [_point(part, row, robot, dofs) for row in part.rows]
+        if not part.begins:
+            if robot in ended:
+                rows.insert(0, ended[robot])
+            _report_no_start(part, robot in ended)
+        ended[robot] = rows[-1]
+        columns.append(rows)
+    longest = max(map(len, columns))
+    # Who is done waits at its goal.
+    columns = [rows + rows[-1:] * (longest - len(rows)) for rows in columns]
+    configurations = tuple(tuple(chain.from_iterable(row)) for row in zip(*columns, strict=True))
+    return Task(tuple(robots[p.robot] for p in task.parts), configurations, task.label, task.node.span)
+
+
+def _point(part: ProblemPart, row: _Numbers, robot: int, dofs: list[int]) -> _Numbers:
+    taken = split_row(row, dofs[robot : robot + 1])
+    if taken is None:
+        found = f"a point of {len(row)} numbers in task {part.node.get('label') or ''!r}"
+        message = f"{found}; expected {dofs[robot]}, the degrees of freedom of robot {part.robot!r}"
+        part.node.fail("CFG504", message, hint="is the task meant for another robot?")
+    return taken[1]
+
+
+def _report_no_start(part: ProblemPart, follows: bool) -> None:
+    label, node = part.node.get("label") or "", part.node
+    if follows:
+        message = f"task {label!r} has no start; it begins where robot {part.robot!r} was at the end of the one before"
+        node.log.info("CFG519", f"<{node.tag}>", message, span=node.span)
+    else:
+        message = f"task {label!r} has no start; robot {part.robot!r} begins at the first of its goals"
+        node.log.warn("CFG519", f"<{node.tag}>", message, hint="add <StartConstraints>", span=node.span)

@@ -234,7 +234,8 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
     for row, span in rows:
         groups.setdefault(row.robot, []).append((row, span))
     return tuple(
-        Task(robot, tuple(row.configuration for row, _ in own), span=own[0][1]) for robot, own in sorted(groups.items())
+        Task((robot,), tuple(row.configuration for row, _ in own), span=own[0][1])
+        for robot, own in sorted(groups.items())
     )
 
 
@@ -242,7 +243,7 @@ def query_text(tasks: Iterable[Task], *, index: bool) -> str:
     """Return a query file with the configurations of some tasks, one a line, with 17 digits.
 
     Args:
-        tasks: What is to be visited, in the file's own numbers.
+        tasks: What is to be visited, by one robot each, in the file's own numbers.
         index: Whether the robot's index stands in front of each configuration.
     """
     rows = (row_text(c, task.robot if index else None) for task in tasks for c in task.configurations)

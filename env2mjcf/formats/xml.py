@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn, TypeVar
 
 from lxml import etree
@@ -37,6 +37,11 @@ _ENCODING = re.compile(r"^(<\?xml[^>]*?\s)encoding\s*=\s*(?:\"[^\"]*\"|'[^']*')"
 _PART, _LXML_NESTING = 1 << 14, 250
 # How the versions of lxml call what is longer than they take.
 _TOO_LONG = re.compile("too (?:big|long)|XML_PARSE_HUGE|huge text node|Huge input lookup")
+# What collision checkers say about pairs, in lower case.
+_PAIR_RULES = (
+    *("ignoreselfcollision", "ignoreadjacentlinks", "ignoreiadjacentlinks", "ignore_i_adjacent_links"),
+    *("ignoresiblingcollisions", "interrobotcollision"),
+)
 _PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
 _PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
 
@@ -49,11 +54,13 @@ class Document:
         source: The file.
         log: Where findings go.
         places: Where the start tag of every element lies in the text.
+        told: Elements and attributes that were reported as not used, by their names and that of what they stand in.
     """
 
     source: Source
     log: DiagnosticLog
     places: Mapping[Any, tuple[int, int]]
+    told: set[tuple[str, str]] = field(default_factory=set)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,20 +175,38 @@ class Node:
         self.log.fail(code, f"<{self.tag}>", message, hint=hint, span=span)
 
     def ignore_other_children(self, *known: str) -> None:
-        """Report the child elements that nothing reads."""
+        """Report the child elements that nothing reads, one of each kind in a file, all in one diagnostic."""
         folded = {k.lower() for k in known}
+        others: dict[str, Node] = {}
         for child in self.children():
-            if child.tag.lower() not in folded:
-                child.ignore(f"<{child.tag}> of <{self.tag}> is not used")
+            if child.tag.lower() not in folded and self._first(f"<{child.tag}>"):
+                others[f"<{child.tag}>"] = child
+        if others:
+            listed = ", ".join(list(others)[:12]) + (", ..." if len(others) > 12 else "")
+            first = next(iter(others.values()))
+            hint = did_you_mean(first.tag, known) if len(others) == 1 else ""
+            message = f"{listed} of <{self.tag}> {'is' if len(others) == 1 else 'are'} not used"
+            self.log.info("ENV307", f"<{first.tag}>", message, hint=hint, span=first.span)
 
     def ignore_other_attributes(self, *known: str) -> None:
-        """Report the attributes that nothing reads."""
-        others = [name for name in self.names if name not in known]
+        """Report the attributes that nothing reads, once for each name and kind of element in a file."""
+        others = [name for name in self.names if name not in known and self._first(name)]
         places = self._values() if others else {}
         for name in others:
-            message = f"attribute {name!r} of <{self.tag}> is not used"
             span = self.source.span(*places[name]) if name in places else self.span
+            if name.lower() in _PAIR_RULES and self.tag.lower() != "collisiondetection":
+                message = f"{name!r} of <{self.tag}> is not followed: it counts on <CollisionDetection>"
+                hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
+                self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
+                continue
+            message = f"attribute {name!r} of <{self.tag}> is not used"
             self.log.info("ENV311", f"<{self.tag}>", message, hint=did_you_mean(name, known), span=span)
+
+    def _first(self, name: str) -> bool:
+        """Whether something of this name in elements of this kind was not told before."""
+        before = len(self.document.told)
+        self.document.told.add((self.tag, name))
+        return len(self.document.told) > before
 
     def ignore(self, message: str) -> None:
         """Report that nothing reads this element."""

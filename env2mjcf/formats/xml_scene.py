@@ -34,7 +34,8 @@ _ADJUSTMENTS = {"none": Recentring.NONE, "com": Recentring.COM, "surface": Recen
 _BASES = {"planar": "Planar", "volumetric": "Volumetric", "fixed": "Fixed"}
 _MOVEMENTS = {"rotational": "Rotational", "translational": "Translational"}
 _RESOLUTIONS = {"positionRes": "position", "orientationRes": "orientation", "timeRes": "time"}
-_BODY_ATTRIBUTES = ("filename", "comAdjustment", "color", "type", "transform", "mass")
+_BODY_ATTRIBUTES = ("filename", "comAdjustment", "color", "type", "mass")
+_ENVIRONMENT_ATTRIBUTES = ("filename", "input_env", *_RESOLUTIONS, "gravity", "frictionCoefficient")
 
 
 def read_environment(node: Node) -> Environment:
@@ -65,6 +66,7 @@ def with_environment_attributes(environment: Environment, node: Node) -> Environ
             resolution = replace(resolution, **{name: value})
             if name == "position":
                 resolution = replace(resolution, span=node.span_of(attribute))
+    node.ignore_other_attributes(*_ENVIRONMENT_ATTRIBUTES)
     kept = tuple(sorted((k, v) for k, v in node.attributes.items() if k not in ("filename", "input_env")))
     return replace(environment, resolution=resolution, attributes=(*environment.attributes, *kept))
 
@@ -76,11 +78,14 @@ def read_robot(node: Node) -> MultiBody:
         multibody.choice("type", {"active": None})
     base = multibody.only_child("Base", "ENV145")
     links = list(multibody.children("Link"))
-    bodies = [_read_body(base, _read_base(base), "movement")]
+    kind = _read_base(base)
+    bodies = [_read_body(base, kind, *["movement"] * (kind is not BaseKind.FIXED))]
+    base.ignore_other_children()
     connections: list[Connection] = []
     for number, link in enumerate(links, 1):
         _check_link(link, number)
         bodies.append(_read_body(link, BaseKind.JOINT, "index"))
+        link.ignore_other_children("Connection")
         connections.append(_read_connection(link, number, len(links) + 1))
     multibody.ignore_other_children("Base", "Link")
     multibody.ignore_other_attributes("type")
@@ -130,13 +135,16 @@ def _read_boundary(node: Node) -> Boundary:
     space = node.choice("space", {"workspace": "workspace", "cspace": "cspace"}) if node.get("space") else "workspace"
     boundary = node.read("limits", lambda scan: read_extent(scan, shape, node.span_of("limits")))
     node.ignore_other_attributes("shape", "space", "limits")
+    node.ignore_other_children()
     return replace(boundary, space=space, span=node.span)
 
 
 def _read_obstacle(node: Node) -> MultiBody:
     kind = node.choice("type", _KINDS)
     base = node.only_child("Base", "ENV145")
+    node.ignore_other_attributes("type")
     node.ignore_other_children("Base")
+    base.ignore_other_children()
     if base.get("type") is not None and base.choice("type", {**_BASES, "joint": "Joint"}) != "Fixed":
         message = f"an obstacle with a {base.get('type')} base; expected fixed"
         base.fail("ENV123", message, hint="write type='fixed'", at="type")
@@ -162,7 +170,7 @@ def _read_body(node: Node, base: BaseKind, *more_attributes: str) -> Body:
         mass=_read_mass(node) if node.get("mass") is not None else None,
         span=node.span_of("filename"),
     )
-    node.ignore_other_attributes(*_BODY_ATTRIBUTES, *more_attributes)
+    node.ignore_other_attributes(*_BODY_ATTRIBUTES, *["transform"] * (base is BaseKind.FIXED), *more_attributes)
     return replace(body, pose=_read_fixed_pose(node)) if base is BaseKind.FIXED else body
 
 
@@ -192,7 +200,7 @@ def _check_link(link: Node, number: int) -> None:
 
 def _read_connection(link: Node, number: int, bodies: int) -> Connection:
     node = link.only_child("Connection", "ENV147")
-    link.ignore_other_children("Connection")
+    node.ignore_other_children()
 
     def index(name: str) -> int:
         return node.read(name, lambda scan: read_body_index(scan, bodies))

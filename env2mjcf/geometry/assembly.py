@@ -153,9 +153,11 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     _refuse_sma(environment, log)
     meshes = _Meshes(environment, options, log)
     names = body_names(environment)
+    active, drawn = ({id(m) for m in group} for group in (environment.robots, environment.surfaces))
     placed: list[tuple[MultiBody, RobotKinematics, Array, list[_Placed]]] = []
     for i, multibody in enumerate(environment.multibodies):
-        kinematics = RobotKinematics.of(multibody, log)
+        # How robots hang together was judged when they were read.
+        kinematics = RobotKinematics.of(multibody, None if id(multibody) in active else log)
         home = kinematics.home(log)
         # `_bounding_box` finds what overflows.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -168,7 +170,6 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies], log)
     thickness = _THICKNESS_PER_EXTENT * float(np.linalg.norm(upper - lower))
     _check_extent(environment, float(np.linalg.norm(upper - lower)), log)
-    active, drawn = ({id(m) for m in group} for group in (environment.robots, environment.surfaces))
     robots: dict[int, RobotParts] = {}
     obstacles: list[Part] = []
     surfaces: list[Part] = []

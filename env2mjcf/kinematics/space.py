@@ -5,7 +5,7 @@ In qpos robots stand in order, bodies depth first, joints in the order of the ch
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
 
@@ -143,12 +143,39 @@ class ConfigurationSpace:
         """Turn limits (..., dim), which may be infinite, into the file's numbers."""
         return limits / self._units
 
-    def of_task(self, task: Task) -> Array:
-        """Return a task's configurations, (k, dim), with the other robots at home."""
-        columns = self.robot_slices[task.robot]
-        q = np.tile(self.home, (len(task.configurations), 1))
-        q[:, columns] = np.array(task.configurations, dtype=np.float64).reshape(len(q), -1) * self._units[columns]
+    def columns(self, robots: Iterable[int]) -> NDArray[np.int64]:
+        """Return the columns of some robots, in the order of these."""
+        every = np.arange(self.dim)
+        return np.concatenate([every[:0], *(every[self.robot_slices[i]] for i in robots)])
+
+    def standing(self, tasks: Iterable[Task], rest: Array | None = None, *, radians: bool = False) -> Array:
+        """Return where robots stand that do not move, (dim,): at the start of their first task, else where `rest` is.
+
+        Args:
+            tasks: Of some robots.
+            rest: (dim,) for robots without a task; home by default.
+            radians: Whether the tasks' numbers are radians and metres instead of the file's own.
+        """
+        q, unplaced = np.array(self.home if rest is None else rest), np.ones(self.dim, dtype=bool)
+        for task in tasks:
+            columns = self.columns(task.robots)
+            first = unplaced[columns]
+            q[columns[first]] = self._rows(task, radians)[0, first]
+            unplaced[columns] = False
         return q
+
+    def of_tasks(self, tasks: Sequence[Task], rest: Array | None = None, *, radians: bool = False) -> Iterator[Array]:
+        """Yield the configurations of each task, (k, dim), its robots among others that stand; see `standing`."""
+        standing = self.standing(tasks, rest, radians=radians)
+        for task in tasks:
+            q = np.tile(standing, (len(task.configurations), 1))
+            q[:, self.columns(task.robots)] = self._rows(task, radians)
+            yield q
+
+    def _rows(self, task: Task, radians: bool) -> Array:
+        columns = self.columns(task.robots)
+        rows = np.array(task.configurations, dtype=np.float64).reshape(-1, len(columns))
+        return rows if radians else rows * self._units[columns]
 
     def qpos(self, q: ArrayLike) -> Array:
         """Turn q (..., dim) into MuJoCo's qpos (..., nq)."""

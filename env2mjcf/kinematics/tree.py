@@ -139,8 +139,10 @@ def _adopt_stray(multibody: MultiBody, index: int, bases: dict[int, BaseKind], l
         message = f"body {index} ({body.filename}) is a Joint, but no connection leads to it"
         hint = "add a connection, or give it a base (Planar, Volumetric, Fixed)"
         log.fail("KIN301", body.filename, message, hint=hint, span=body.span)
-    message = f"no connection leads to FreeBody {index} ({body.filename}); it gets a free base of its own"
-    log.warn("KIN302", body.filename, message, span=body.span)
+    place = "the origin" if body.pose is None else "its own pose"
+    message = f"no connection leads to FreeBody {index} ({body.filename}): it is a base of its own, at home at {place}"
+    hint = "the original planner has no numbers for it in a configuration; is a connection missing?"
+    log.warn("KIN302", body.filename, message, hint=hint, span=body.span)
     bases[index] = BaseKind.VOLUMETRIC_ROTATIONAL
 
 

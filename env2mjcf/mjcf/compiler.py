@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 
 from lxml import etree
 
@@ -20,9 +21,6 @@ from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
 from .markup import Element, add, comment_text, numbers, plain, to_text
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file
-
-# Attributes of an <Environment> node that concern the planner's own simulation.
-_PHYSICS = ("gravity", "frictionCoefficient")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +95,7 @@ def _header(assembly: Assembly, options: Options) -> str:
 def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
     """Append `home`, and `start` and `goal` where there is a task."""
     keys = {"home": space.home}
-    if tasks and len(tasks[0].configurations):
-        q = space.of_task(tasks[0])
+    for q in islice(space.of_tasks(tasks), 1):
         keys |= {"start": q[0], "goal": q[-1]}
     if not space.nq:
         return
@@ -120,13 +117,11 @@ def _report_unused(assembly: Assembly, options: Options, log: DiagnosticLog) -> 
             why = "with collision='surface' surfaces collide, and a box geom is solid"
             hint = "collision='auto' collides solids"
         log.info("MJC416", environment.name, f"primitives=True has no effect: {why}", hint=hint)
-    attributes = dict(environment.attributes)
-    for name in _PHYSICS:
-        followed = name == "gravity" and options.gravity is None and any(gravity_of_file(environment) or ())
-        if name in attributes and not followed:
-            message = f"{name}={attributes[name]!r} of the file is the planner's, and is not written"
-            hint = "give gravity=(x, y, z) (--gravity)" if name == "gravity" else ""
-            log.info("MJC412", name, message, hint=hint)
+    _report_gravity(environment, options, log)
+    friction = dict(environment.attributes).get("frictionCoefficient")
+    if friction is not None:
+        message = f"frictionCoefficient={friction!r} of the file is the planner's, and is not written"
+        log.info("MJC412", "frictionCoefficient", message)
     for multibody in environment.multibodies:
         if multibody.controls or multibody.velocity_bounds:
             message = f"{len(multibody.controls)} controls and the velocity bounds of the robot are kept, not written"
@@ -134,3 +129,20 @@ def _report_unused(assembly: Assembly, options: Options, log: DiagnosticLog) -> 
         for body in multibody.bodies:
             if body.texture is not None:
                 log.info("MJC414", body.filename, f"texture {body.texture!r} is kept, not drawn", span=body.span)
+
+
+def _report_gravity(environment: Environment, options: Options, log: DiagnosticLog) -> None:
+    """Say why the file's gravity is not used, where it is not."""
+    text, vector = dict(environment.attributes).get("gravity"), gravity_of_file(environment)
+    if text is None:
+        return
+    what, used = f"gravity={text!r} of the file", " ".join(f"{g:g}" for g in options.acceleration(vector))
+    hint = "give gravity=(x, y, z) (--gravity)"
+    if vector is None:
+        message = f"{what} is not three finite numbers, and not used; the MJCF has {used}"
+        log.warn("MJC412", "gravity", message, hint=hint)
+    elif options.gravity is not None:
+        log.info("MJC412", "gravity", f"{what} is overruled by the option; the MJCF has {used}")
+    elif not any(vector):
+        message = f"{what}, the planner's default, is not taken for weightlessness; the MJCF has {used}"
+        log.info("MJC412", "gravity", message, hint="give gravity=(0, 0, 0) (--gravity 0 0 0) if it is meant")

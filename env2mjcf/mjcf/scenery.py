@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.assembly import Assembly, Part
+from ..limits import LARGEST
 from ..model.environment import Boundary, Environment
 from ..options import Options
 from ..pairs import PairTable
@@ -21,12 +22,15 @@ OVERVIEW = (0.55, -1.0, 0.75)
 
 
 def gravity_of_file(environment: Environment) -> tuple[float, float, float] | None:
-    """Return the gravity that an XML file gives, in its own units of length; None unless it is three finite numbers."""
+    """Return the gravity that an XML file gives, in its own units of length; None unless it is three numbers.
+
+    What is too large to be computed with counts as none.
+    """
     try:
         x, y, z = (float(word) for word in dict(environment.attributes).get("gravity", "").split())
     except ValueError:
         return None
-    return (x, y, z) if math.isfinite(x + y + z) else None
+    return (x, y, z) if max(abs(x), abs(y), abs(z)) <= LARGEST and math.isfinite(x + y + z) else None
 
 
 def time_step(assembly: Assembly, gravity: tuple[float, float, float]) -> float:

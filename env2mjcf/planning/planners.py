@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from typing import Protocol
@@ -47,13 +48,21 @@ def checked_planner(name: str) -> str:
         raise TypeError(f"planner is {name!r}; expected one of {', '.join(PLANNERS)}")
     spelled = {n.lower(): n for n in PLANNERS} | {c.lower(): n for n, c in OMPL_PLANNERS.items()}
     if name.lower() not in spelled:
-        guess = did_you_mean(name, PLANNERS)
+        guess = _guess(name)
         raise ValueError(
             f"there is no planner {name!r}{f'; {guess}' if guess else ''} (planners: {', '.join(PLANNERS)})"
         )
     if find_spec("ompl") is None:
         raise ValueError(f"planner {spelled[name.lower()]} needs one more package: pip install 'env2mjcf[planning]'")
     return spelled[name.lower()]
+
+
+def _guess(name: str) -> str:
+    """Return which planner a name may be meant for: short forms such as RRTC, and stars, are common."""
+    short = re.sub(r"[^a-z0-9]", "", name[:60].lower().replace("*", "star"))
+    longer = [n for n in PLANNERS if len(short) > 1 and short in n.lower()]
+    longer.sort(key=lambda n: not n.lower().startswith(short))
+    return did_you_mean([*longer, short][0], PLANNERS)
 
 
 # The first turn of each planner, in checks; every round doubles it. Counted in checks and not in seconds, turns are the

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import DiagnosticLog
+from ..errors import robots_named
 from ..options import positive, whole
-from ..simulation.scene import Scene
+from ..simulation.scene import Query, Scene
 from ..system.locks import Lock
 from ..transforms import Array
 from .planner_space import PlanningSpace
@@ -32,7 +33,7 @@ def plan(
     goal: ArrayLike,
     *,
     planner: str = "auto",
-    robot: int | None = None,
+    robot: int | Iterable[int] | None = None,
     time: float = 60.0,
     seed: int = 0,
     resolution: float | None = None,
@@ -50,7 +51,8 @@ def plan(
         start: (dim,) all robots.
         goal: (dim,). With `robot`, its numbers for the other robots count for nothing.
         planner: One of `PLANNERS`, in any case.
-        robot: Index of the robot that moves, the others staying as they are in `start`; None moves all.
+        robot: Index of the robot that moves, or several of robots that move together (`query.robots`), the others
+            staying as they are in `start`; None moves all.
         time: Seconds after which to give up.
         seed: Of the random numbers, zero or more.
         resolution: Greatest distance in metres that any point of a robot moves between two checks of the planner; None
@@ -78,7 +80,7 @@ def plan_through(
     q: ArrayLike,
     *,
     planner: str = "auto",
-    robot: int | None = None,
+    robot: int | Iterable[int] | None = None,
     time: float = 60.0,
     seed: int = 0,
     resolution: float | None = None,
@@ -90,9 +92,9 @@ def plan_through(
     With `robot`, the others stay as they are in the first configuration.
     """
     rows, name = scene.space.check(q), checked_planner(planner)
-    _refuse(scene, rows, robot, time, seed)
-    step = _step(scene, resolution)
+    _refuse(scene, rows, time, seed)
     columns = _columns(scene, robot)
+    step = _step(scene, resolution)
     # What does not move is in every row as in the first.
     moved, rows = rows, np.repeat(rows[:1], len(rows), axis=0)
     rows[:, columns] = moved[:, columns]
@@ -130,9 +132,22 @@ def _joined(space: PlanningSpace, legs: list[Segment], seconds: float, checks: i
     )
 
 
-def _columns(scene: Scene, robot: int | None) -> NDArray[np.int64]:
-    every = np.arange(scene.space.dim)
-    return every if robot is None else every[scene.space.robot_slices[robot]]
+def _columns(scene: Scene, robot: int | Iterable[int] | None) -> NDArray[np.int64]:
+    """Return the columns of what moves, in ascending order.
+
+    Raises:
+        TypeError, ValueError: There is no such robot, or it has nothing to move.
+    """
+    if robot is None:
+        return np.arange(scene.space.dim)
+    robots = len(scene.space.robot_slices)
+    moving = sorted({whole("robot", r, 0) for r in (robot if isinstance(robot, Iterable) else (robot,))})
+    if not moving or moving[-1] >= robots:
+        raise ValueError(f"there is no robot {moving[-1] if moving else robot}; the scene has {robots}, counted from 0")
+    columns = scene.space.columns(moving)
+    if not len(columns):
+        raise ValueError(f"nothing can move: {robots_named(moving)} without degrees of freedom")
+    return columns
 
 
 def _step(scene: Scene, resolution: float | None) -> float:
@@ -149,17 +164,12 @@ def _step(scene: Scene, resolution: float | None) -> float:
     DiagnosticLog().fail("CFG536", "PositionRes", message, hint=hint, span=of_file.span)
 
 
-def _refuse(scene: Scene, rows: Array, robot: int | None, time: float, seed: int) -> None:
+def _refuse(scene: Scene, rows: Array, time: float, seed: int) -> None:
     """Raise a TypeError or ValueError for arguments that nothing can be planned with."""
-    robots = len(scene.space.robot_slices)
     if not scene.space.dim:
         raise ValueError("nothing can move: the scene has no degrees of freedom")
     if rows.ndim != 2 or len(rows) < 2:
         raise ValueError(f"configurations of shape {rows.shape}; expected a start and a goal, (k, {scene.space.dim})")
-    if robot is not None and not 0 <= whole("robot", robot, 0) < robots:
-        raise ValueError(f"there is no robot {robot}; the scene has {robots}, counted from 0")
-    if robot is not None and not len(_columns(scene, robot)):
-        raise ValueError(f"nothing can move: robot {robot} has no degrees of freedom")
     positive("time", time)
     whole("seed", seed, 0)
 
@@ -169,6 +179,12 @@ def _refuse_invalid(scene: Scene, rows: Array) -> None:
     for name, row in zip(names_of(len(rows)), rows, strict=True):
         if not scene.is_valid(row):
             raise ValueError(f"the {name} is not valid: {'; '.join(map(str, scene.explain(row).reasons))}")
+
+
+def alone(scene: Scene, query: Query) -> bool:
+    """Whether a path of the first robot's numbers says all about a way of a query: the other robots are at home."""
+    others = np.setdiff1d(np.arange(scene.space.dim), scene.space.columns(query.robots[:1]))
+    return len(query.robots) == 1 and bool((query.q[:, others] == scene.space.home[others]).all())
 
 
 def names_of(count: int) -> list[str]:

@@ -6,7 +6,7 @@ import copy
 import dataclasses
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from math import isfinite
@@ -24,7 +24,7 @@ from ..contact.threads import ask, thread_count
 from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
-from ..model.environment import Environment
+from ..model.environment import Environment, Task
 from ..options import Engine
 from ..pairs import Pair
 from ..pipeline import Compiled
@@ -57,14 +57,30 @@ class Query:
     """Configurations to be visited in turn.
 
     Attributes:
-        robot: Index of the robot that moves.
-        q: (k, dim) start, via and goal configurations, the other robots at home.
+        robot: Index of the robot that moves; of several, the first.
+        q: (k, dim) start, via and goal configurations. Robots that do not move stand at the start of their own first
+            query, those without one at home.
         label: Name of the task, where a problem file gives one.
+        robots: Indices of all robots that move, together.
     """
 
     robot: int
     q: Array
     label: str = ""
+    robots: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "robots", tuple(self.robots) or (self.robot,))
+        if self.robots[0] != self.robot:
+            raise ValueError(f"robots={self.robots} do not begin with robot={self.robot}")
+
+
+def queries_of(
+    space: ConfigurationSpace, tasks: Sequence[Task], rest: Array | None = None, *, radians: bool = False
+) -> tuple[Query, ...]:
+    """Return tasks as queries; see `ConfigurationSpace.of_tasks`."""
+    decoded = zip(tasks, space.of_tasks(tasks, rest, radians=radians), strict=True)
+    return tuple(Query(t.robot, q, t.label, t.robots) for t, q in decoded)
 
 
 class Scene:
@@ -146,7 +162,7 @@ class Scene:
     @property
     def queries(self) -> tuple[Query, ...]:
         """The tasks of the query file or problem XML, decoded."""
-        return tuple(Query(t.robot, self.space.of_task(t), t.label) for t in self.environment.tasks)
+        return queries_of(self.space, self.environment.tasks)
 
     def spec(self) -> mujoco.MjSpec:
         """Return the scene as a new MjSpec, to be attached to another one.

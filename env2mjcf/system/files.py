@@ -57,6 +57,26 @@ def output(file: str | os.PathLike[str], code: str) -> Generator[Path]:
         yield staged
 
 
+@contextmanager
+def made_folder(folder: Path, code: str) -> Generator[None]:
+    """Make a folder, with those that it lies in; where what is done in it fails, remove what was made and is empty.
+
+    Raises:
+        ConversionError: It cannot be made.
+    """
+    missing = [f for f in (folder, *folder.parents) if not os.path.lexists(f)]
+    try:
+        if missing and "\0" not in str(folder):
+            with _said(folder, code):
+                folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for made in missing:
+            with suppress(OSError):
+                made.rmdir()
+        raise
+
+
 def write_together(contents: Mapping[Path, bytes], code: str) -> None:
     """Write several files, or leave all as they were where one cannot be written.
 

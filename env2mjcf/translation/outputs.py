@@ -13,6 +13,7 @@ from ..errors import Diagnostic, Env2MjcfError
 from ..formats.detect import detect
 from ..formats.env import read_robot
 from ..formats.lexer import Scanner
+from ..formats.reading import robot_dofs
 from ..formats.rows import number_lines, query_text
 from ..formats.source import Source, read_source
 from ..formats.writers import env_text, robot_text
@@ -21,7 +22,7 @@ from ..limits import Limits
 from ..model.dialects import begins_with_robot
 from ..model.environment import Environment, MultiBody
 from ..options import Options, PathArgument
-from ..system.files import refuse_replacement, refuse_unwritable, write_together
+from ..system.files import made_folder, refuse_replacement, refuse_unwritable, write_together
 
 
 class Kind(StrEnum):
@@ -108,7 +109,8 @@ def write_environment(
 ) -> Written:
     """Write an environment in its own dialect, all files or, where one cannot be written, none.
 
-    Meshes stay where they are: their names are written so that they are found from the new folder.
+    The folder is made if need be. Meshes stay where they are: their names are written so that they are found from
+    there.
 
     An older env file is replaced, and so are a robot file and a query of its stem; nothing else is. No file system
     renames several files at once: a process that is killed meanwhile may leave new robots and queries beside the old
@@ -124,8 +126,15 @@ def write_environment(
         ConversionError: A file cannot be written, is one that the environment was read from, or would replace something
             else; or a mesh cannot be named from there.
     """
-    log = DiagnosticLog()
     out = Path(os.fspath(file))
+    with made_folder(out.parent, "ENV179"):
+        return _write_environment(environment, out, mesh_dirs, allow_outside)
+
+
+def _write_environment(
+    environment: Environment, out: Path, mesh_dirs: Iterable[PathArgument], allow_outside: bool
+) -> Written:
+    log = DiagnosticLog()
     names = _robot_files(out, len(_apart(environment)))
     query = out.with_suffix(".query") if environment.tasks else None
     if out in (*names, query):
@@ -137,7 +146,9 @@ def write_environment(
     placed, outside = named_from(out.parent, environment, options, log)
     companions = [Output(n, Kind.ROBOT, robot_text(m)) for n, m in zip(names, _apart(placed), strict=True)]
     if query is not None:
-        rows = query_text(environment.tasks, index=begins_with_robot(environment))
+        dofs = robot_dofs(environment, DiagnosticLog())
+        alone = [own for task in environment.tasks for own in task.of_each(dofs)]
+        rows = query_text(alone, index=begins_with_robot(environment))
         companions.append(Output(query, Kind.QUERY, rows))
     scene = Output(out, Kind.ENVIRONMENT, env_text(placed))
     refuse_foreign_outputs(scene, companions)

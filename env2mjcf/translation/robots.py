@@ -267,8 +267,8 @@ class DofMap:
         return tuple(found)
 
     def task(self, task: Task) -> Task:
-        """Turn a task's configurations into the target's numbers."""
-        return Task(task.robot, tuple(self.numbers(c) for c in task.configurations), task.label, task.span)
+        """Turn the configurations of a task of this robot alone into the target's numbers."""
+        return Task(task.robots, tuple(self.numbers(c) for c in task.configurations), task.label, task.span)
 
 
 def _key(dof: Dof, source: MultiBody, target: MultiBody) -> tuple[int | None, int, DofKind]:

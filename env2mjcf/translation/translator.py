@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic
-from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules
+from ..errors import Diagnostic, robots_named
+from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules, Task
 from .robots import DofMap, translate_obstacles, translate_robot
 from .scene_parts import Losses, translated_boundary, translated_resolution
 
@@ -62,7 +62,7 @@ def translate(
         multibodies=found,
         boundary=translated_boundary(environment, losses),
         resolution=translated_resolution(environment, losses),
-        tasks=tuple(maps[t.robot].task(t) for t in environment.tasks),
+        tasks=tuple(maps[t.robot].task(t) for t in _of_one_robot_each(environment, maps, losses)),
         semantics="planner",
         declared_multibodies=written,
         attributes=(),
@@ -134,6 +134,16 @@ def _report_number(environment: Environment, losses: Losses) -> None:
     if len(robots) > 1:
         message = f"{len(robots)} robots; the planner of dialect A moves the first, and takes the others for obstacles"
         losses.lost("ENV176", environment.name, message, span=robots[1].span)
+
+
+def _of_one_robot_each(environment: Environment, maps: Sequence[DofMap], losses: Losses) -> Iterator[Task]:
+    """Yield the tasks; what several robots are to do together as the tasks of each."""
+    dofs = [len(m.source.dofs) for m in maps]
+    for task in environment.tasks:
+        if len(task.robots) > 1:
+            message = f"query files do not say that {robots_named(task.robots)} move together; each gets its own rows"
+            losses.lost("ENV177", task.label or environment.name, message, span=task.span)
+        yield from task.of_each(dofs)
 
 
 def _report_xml(environment: Environment, losses: Losses) -> None:

@@ -37,8 +37,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
         ("a.csv", "x,y,x,y,angle\n1,2,3,4,0.5\n", False, [ALL]),
         ("a.csv", "1 2 3 4 0.5\n1 3 4 0.5  # robot 1\n", True, [HALF, SECOND]),
         ("a.TXT", "1 3 4 0.5\n", False, [[0, 0, 3, 4, 0.5]]),
-        ("a.query", "0 1 2\n1 3 4 0.5\n", False, [FIRST, SECOND]),
-        ("a.query", "1 3 4 0.5\n0 1 2\n", True, [FIRST, SECOND]),
+        # Each robot of a query stands at its start while the other moves.
+        ("a.query", "0 1 2\n1 3 4 0.5\n", False, [HALF, HALF]),
+        ("a.query", "0 1 2\n0 9 9\n1 3 4 0.5\n", True, [HALF, [4.5, 4.5, *HALF[2:]], HALF]),
         ("a.path", PATH, False, [SECOND, FIRST]),
         ("a.map", ROADMAP, True, [FIRST, [2.5, 3, 0, 0, 0]]),
         ("named otherwise", PATH, True, [SECOND, FIRST]),

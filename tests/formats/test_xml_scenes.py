@@ -289,7 +289,7 @@ def problem(tmp_path: Path) -> Reader:
 
 def test_a_problem_brings_environment_robot_and_task_together(problem: Reader) -> None:
     scene = problem(PROBLEM)
-    assert (scene.name, len(scene.obstacles), [r.label for r in scene.robots]) == ("scene", 2, ["rob"])
+    assert (scene.name, len(scene.obstacles), [r.label for r in scene.robots]) == ("problem", 2, ["rob"])
     (task,) = scene.tasks
     assert (task.label, task.robot, task.configurations) == ("go", 0, ((1, 2, 0.1, 0.2, 0.3), (3, 4, 0.4, 0.5, 0.6)))
     assert (scene.planner_rules.adjacent_links, scene.planner_rules.ignore_self_collision) == (1, False)

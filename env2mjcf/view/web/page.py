@@ -9,7 +9,7 @@ import html
 from typing import TYPE_CHECKING, Protocol
 
 from ...contact.types import Verdict
-from ...errors import one_line
+from ...errors import one_line, robots_named
 from ...kinematics.space import ConfigurationSpace
 from ...simulation.scene import Query, Scene
 from ...transforms import Array
@@ -141,7 +141,7 @@ class Page:
 
     def _add_query(self, number: int, query: Query) -> None:
         several = len(self._scene.queries) > 1
-        robot = f"robot {query.robot}" if len(self._scene.space.robot_slices) > 1 else f"task {number}"
+        robot = robots_named(query.robots) if len(self._scene.space.robot_slices) > 1 else f"task {number}"
         self._add_ends(query.label or (robot if several else ""), query.q)
 
     def _add_ends(self, label: str, rows: Array) -> None:
