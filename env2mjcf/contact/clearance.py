@@ -67,32 +67,9 @@ class Clearance:
         deep[held] = self._surfaces.contained(jobs.only(held))
         out = found.distance
         if deep.any():
-            worst = self._depths(jobs, np.flatnonzero(deep), self._hits(jobs, np.unique(row[touches])))
             out[row[deep]] = 0.0
-            np.minimum.at(out, row[deep], -worst)
+            np.minimum.at(out, row[deep], -separations(self._surfaces, jobs.only(deep), self.touch)[0])
         return out
-
-    def _hits(self, jobs: Jobs, rows: Ints) -> Ints:
-        """Return job and triangles, (t, 3), of some pairs that touch in each row.
-
-        Which pairs a search meets depends on all that it looks at, and the depths depend on these pairs. So each row is
-        searched by itself: its depth must not depend on which rows are asked about together.
-        """
-        found = [np.zeros((0, 3), dtype=np.int64)]
-        for row in rows:
-            own = np.flatnonzero(jobs.group == row)
-            alone = jobs.only(own)
-            alone = Jobs(alone.a, alone.b, alone.rotation, alone.translation, np.zeros(len(own), dtype=np.int64))
-            hits = Search(self._surfaces.trees, alone, np.array([np.inf]), self.touch).run().touching
-            found.append(np.column_stack([own[hits[:, 0]], hits[:, 1:]]))
-        return np.concatenate(found)
-
-    def _depths(self, jobs: Jobs, deep: Ints, touching: Ints) -> Floats:
-        renumbered = np.full(len(jobs.a), -1)
-        renumbered[deep] = np.arange(len(deep))
-        touching = touching[renumbered[touching[:, 0]] >= 0]
-        hits = np.column_stack([renumbered[touching[:, 0]], touching[:, 1:]])
-        return separations(self._surfaces, jobs.only(deep), hits, self.touch)[0]
 
     def _near(self, poses: Array) -> tuple[Ints, Ints, Floats]:
         """Return row, pair and distance of bounding spheres, of all pairs that may be the nearest of their row."""

@@ -8,20 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.assembly import Part
-from ..geometry.distance import nearest
+from ..geometry.distance import Nearest, nearest
 from ..geometry.topology import Floats
 from ..geometry.triangle_search import Jobs, Search
 from ..pairs import Pair
 from ..transforms import Array
 from .clearance import BAND, Clearance
-from .separation import nearest_points, separations
-from .surfaces import Surface, Surfaces, unit_normals
+from .separation import nearest_points, off_planes, overlap, pair_triangles, separations, touching_triangles
+from .surfaces import Surfaces
 from .types import Contact
 
 # The most contacts of a pair.
 _MOST = 8
 # Contacts nearer than this, in sizes of the smaller body, whose normals are within about 18 degrees, are one.
 _NEAR, _ALIKE = 0.05, 0.95
+# Corners of convex bodies that are less far in than the farthest, by this in sizes of the smaller one, touch as well.
+_FLAT = 1e-3
 _BLOCK = 4096
 
 
@@ -37,9 +39,11 @@ class Touch:
 class Manifolds:
     """Turns what touches into a few contacts for each pair, the deepest first.
 
-    Contacts of two hulls are MuJoCo's own. The normals and depths of thin surface cells mean nothing, so those of
-    surfaces come from the triangles that touch: the normal is that of one of the two faces, and the depth how far to
-    push the link's triangle against it until it is beside the other. Bodies inside others are pushed out.
+    The first is as deep as the pair, by the least push that `separations` knows, and none is deeper. Those of two
+    convex bodies are corners of the area where they come free last. Others have the places, normals and depths of
+    their parts as well: of bodies made of several hulls, those of MuJoCo. Normals and depths of thin surface cells
+    mean nothing, so those of surfaces come from the triangles that touch: the normal is that of one of the two faces,
+    and the depth how far to push the link's triangle against it until it is beside the other.
     """
 
     def __init__(
@@ -65,50 +69,72 @@ class Manifolds:
         out: list[Contact] = []
         for index in sorted({*touching, *contained}):
             pair = self._pairs[index]
-            if self._hulls[pair.link] and self._hulls[pair.other] and index in touching:
-                found = touching[index]
-            else:
-                found = self._of_triangles(index, poses)
             near = _NEAR * min(self._sizes[pair.link], self._sizes[pair.other])
-            for t in merged(found, near):
+            for t in merged(self._of_pair(index, touching.get(index, []), poses), near):
                 out.append(Contact(pair.link, pair.other, pair.kind, t.position, t.normal, t.distance))
         return out
 
-    def _of_triangles(self, index: int, poses: Mapping[str, Array]) -> list[Touch]:
+    def _of_pair(self, index: int, found: list[Touch], poses: Mapping[str, Array]) -> list[Touch]:
+        pair, surfaces, touch = self._pairs[index], self._surfaces, self._clearance.touch
         job = self._clearance.pair_jobs(poses, np.array([index]))
-        trees, touch = self._surfaces.trees, self._clearance.touch
-        near = Search(trees, job, np.array([np.inf]), touch).within(self._band)
-        rows = near[:, 1:]
-        a, b = trees.triangles[rows[:, 0]], trees.triangles[rows[:, 1]] @ job.rotation[0].T + job.translation[0]
-        parts = [nearest(a[i : i + _BLOCK], b[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
-        distance = np.concatenate([np.zeros(0), *(p.distance for p in parts)])
-        met = distance <= self._band
-        pose = poses[self._pairs[index].link][0]
+        pose = poses[pair.link][0]
+        convex = overlap(surfaces, job, 0)
+        if convex is not None:
+            if convex.depth <= self._band:
+                points = nearest_points(surfaces, job, touch)
+                if points.distance[0] > touch and not surfaces.contained(job)[0]:
+                    return [_apart(points, pose)]
+            places, depths = convex.patch(_FLAT * min(self._sizes[pair.link], self._sizes[pair.other]))
+            turned = pose[:3, :3] @ -convex.push
+            return [Touch(p, turned, -float(d)) for p, d in zip(_world(pose, places), depths, strict=True)]
+        hits = touching_triangles(surfaces, job, touch)
+        if not (len(hits) or surfaces.contained(job)[0]):
+            return [_apart(nearest_points(surfaces, job, touch), pose)]
+        whole, push = separations(surfaces, job, touch)
+        depth, normal = float(whole[0]), pose[:3, :3] @ -push[0]
+        if not (found and self._hulls[pair.link] and self._hulls[pair.other]):
+            found = self._of_triangles(job, pose)
+        return _no_deeper(found, depth, normal)
+
+    def _of_triangles(self, job: Jobs, pose: Array) -> list[Touch]:
+        """Return the contacts of triangles that touch, or where the surfaces of one body inside another are nearest."""
+        near = Search(self._surfaces.trees, job, np.array([np.inf]), self._clearance.touch).within(self._band)[:, 1:]
+        a, b = pair_triangles(self._surfaces, job, near)
+        parts = [nearest(a[i : i + _BLOCK], b[i : i + _BLOCK]) for i in range(0, len(near), _BLOCK)]
+        met = np.concatenate([np.zeros(0), *(p.distance for p in parts)]) <= self._band
         # A body inside another, or a part of the other's inside that a hull stands for.
         if not met.any():
-            return [self._apart_or_inside(job, pose)]
+            return [_apart(nearest_points(self._surfaces, job, self._clearance.touch), pose)]
         places = np.concatenate([(p.on_a + p.on_b) / 2 for p in parts])[met]
         first, second = (self._surfaces.surface(int(t)) for t in (job.a[0], job.b[0]))
-        normals, depths = _through(a[met], b[met], first, second)
-        # A triangle pushed off one that it merely meets at an edge may go far: no contact is deeper than its pair.
-        whole, push = separations(self._surfaces, job, near[distance <= touch], touch)
-        ways = depths <= max(float(whole[0]), self._band)
-        if not ways.any():
-            position = pose[:3, :3] @ places.mean(axis=0) + pose[:3, 3]
-            return [Touch(position, pose[:3, :3] @ -push[0], -float(whole[0]))]
-        world, turned = places[ways] @ pose[:3, :3].T + pose[:3, 3], normals[ways] @ pose[:3, :3].T
-        return [Touch(p, n, -float(d)) for p, n, d in zip(world, turned, depths[ways], strict=True)]
+        directions, ways = off_planes(a[met], b[met], first, second)
+        best = np.argmin(ways, axis=1)
+        rows = np.arange(len(best))
+        world, turned = _world(pose, places), -directions[rows, best] @ pose[:3, :3].T
+        return [Touch(p, n, -float(d)) for p, n, d in zip(world, turned, ways[rows, best], strict=True)]
 
-    def _apart_or_inside(self, job: Jobs, pose: Array) -> Touch:
-        """Return the nearest points of surfaces that do not touch, and how deep one is inside the other, if it is."""
-        touch = self._clearance.touch
-        points = nearest_points(self._surfaces, job, touch)
-        position = pose[:3, :3] @ ((points.on_a[0] + points.on_b[0]) / 2) + pose[:3, 3]
-        if self._surfaces.contained(job)[0]:
-            depth, push = separations(self._surfaces, job, np.zeros((0, 3), dtype=np.int64), touch)
-            return Touch(position, pose[:3, :3] @ -push[0], -float(depth[0]))
-        normal = points.on_b[0] - points.on_a[0]
-        return Touch(position, pose[:3, :3] @ (normal / points.distance[0]), float(points.distance[0]))
+
+def _world(pose: Array, points: Floats) -> Floats:
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def _apart(points: Nearest, pose: Array) -> Touch:
+    """Return the contact of surfaces that do not touch, where they are nearest."""
+    normal = points.on_b[0] - points.on_a[0]
+    place = _world(pose, (points.on_a + points.on_b) / 2)[0]
+    return Touch(place, pose[:3, :3] @ (normal / points.distance[0]), float(points.distance[0]))
+
+
+def _no_deeper(found: Sequence[Touch], depth: float, normal: Floats) -> list[Touch]:
+    """Return contacts of which none is deeper than its pair, and the first as deep, with the normal of the least push.
+
+    A triangle pushed off one that it merely meets at an edge may go far. That of a contact which is too deep says
+    nothing then, but where it is, is kept if there is no better.
+    """
+    sound = [t for t in found if -depth <= t.distance <= 0 and t.normal.any()]
+    alike = [t for t in sound if float(t.normal @ normal) > _ALIKE]
+    place = min(alike or found, key=lambda t: t.distance).position
+    return [Touch(place, normal, -depth), *sound]
 
 
 def merged(touches: Sequence[Touch], near: float) -> list[Touch]:
@@ -128,22 +154,3 @@ def _same(a: Touch, b: Touch, near: float) -> bool:
 
 def _only_hulls(part: Part) -> bool:
     return part.shape is not None and all(p.polygon is None for p in part.shape.pieces)
-
-
-def _through(a: Floats, b: Floats, first: Surface, second: Surface) -> tuple[Floats, Floats]:
-    """Return normals, (k, 3) from a to b, and depths, (k,), of triangles that touch.
-
-    A triangle is pushed out of the other's plane, to the outside where that is known, else to the nearer side.
-    """
-    normal_a, normal_b = (unit_normals(t) for t in (a, b))
-    over_b = np.einsum("kci,ki->kc", a - b[:, :1], normal_b)
-    over_a = np.einsum("kci,ki->kc", b - a[:, :1], normal_a)
-    depths = np.stack([-over_b.min(axis=1), over_b.max(axis=1), -over_a.min(axis=1), over_a.max(axis=1)], axis=1)
-    normals = np.stack([-normal_b, normal_b, normal_a, -normal_a], axis=1)
-    depths = np.where((normals == 0).all(axis=2), np.inf, np.maximum(depths, 0))
-    # Columns 1 and 3 push into the inside.
-    depths[:, 1] = np.inf if second.outward else depths[:, 1]
-    depths[:, 3] = np.inf if first.outward else depths[:, 3]
-    best = np.argmin(depths, axis=1)
-    rows = np.arange(len(a))
-    return normals[rows, best], depths[rows, best]

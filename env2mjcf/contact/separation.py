@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations
 
 import numpy as np
 
@@ -11,17 +11,17 @@ from ..geometry.distance import Nearest, nearest
 from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs, Search
 from ..geometry.triangle_sweep import escapes
+from .convex_depth import FAN, Overlap
 from .surfaces import Surface, Surfaces, unit, unit_normals
 
-# The first window is this fraction of the smaller mesh; each next one is this many times as long.
-_FIRST_WINDOW = 0.05
-_WIDER = 4.0
-# Of a convex pair: the most pairs of edges that are all tried; of more, those of triangles that touch.
-_EDGES = 400
-# Of a pair that is not convex: how many pairs of touching triangles, and how many other directions, are tried.
-_TOUCHING, _OTHERS = 3, 4
-
-_FAN = np.array([np.array(d) / np.linalg.norm(d) for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+# The first window is this fraction of the smaller mesh, or down to this fraction of that where a short push may do;
+# each next one is this many times as long.
+_FIRST_WINDOW, _NARROWEST, _WIDER = 0.1, 0.01, 4.0
+# How many pairs of touching triangles are looked at, in how many directions they are taken apart, how many of the
+# pushes that take all of them apart are tried, and how many others.
+_TOUCHING, _WAYS, _PUSHES, _OTHERS = 512, 10, 6, 8
+_DIGITS = 9
+_BLOCK = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,64 +36,88 @@ class _Trials:
         return _Trials(self.job[chosen], self.direction[chosen], self.offset[chosen])
 
 
-def separations(surfaces: Surfaces, jobs: Jobs, touching: Ints, touch: float) -> tuple[Floats, Floats]:
+def separations(surfaces: Surfaces, jobs: Jobs, touch: float) -> tuple[Floats, Floats]:
     """Return how far to push mesh a of each job clear of b, (j,), and in which direction, (j, 3), in the frame of a.
 
-    Every push really separates the pair, so this never falls short of the shortest translation that does. Convex
-    pairs are pushed along the face normals of both and square to their edges, which finds the shortest one (but of
-    many edges only those of triangles that touch are tried). Others are pushed along the normals of triangles that
-    touch, square to their edges, and along those of 26 even directions and of the line between the middles that would
-    part their hulls soonest: until no triangles cross and none is inside the other.
+    Every push really separates the pair, so this never falls short of the shortest translation that does. Of convex
+    pairs it is the shortest one.
+
+    Others are pushed until no triangles cross and none is inside the other. First come the shortest pushes that take
+    each pair of touching triangles apart, off the plane of one of them or square to an edge of each: one or two or
+    three of these planes decide. Where bodies touch at no more than ten planes and cross nothing else on the way, as in
+    shallow contact with flat walls, in a corner or in a notch, that is the shortest one, too. After that come
+    directions that would part their hulls soonest: of normals of triangles that touch, of lines square to two of
+    these, along which a tunnel leads out, of 26 even directions, and the line between the middles. So a deep overlap
+    of bodies that are not convex may be called deeper than it is.
 
     Args:
         surfaces: Of all bodies.
         jobs: Pairs that touch, or of which one contains the other.
-        touching: (t, 3) job and triangles of pairs at no distance; a job without any is contained.
         touch: What counts as no distance.
     """
     depth, push = np.full(len(jobs.a), np.inf), np.zeros((len(jobs.a), 3))
-    trials: list[tuple[int, Floats, float]] = []
+    first, others = list[_Trials](), list[_Trials]()
+    window = np.zeros(len(jobs.a))
+    sizes = np.linalg.norm(surfaces.trees.half[surfaces.trees.roots], axis=1)
     for k in range(len(jobs.a)):
-        a, b = surfaces.surface(int(jobs.a[k])), surfaces.surface(int(jobs.b[k]))
-        rotation, translation = jobs.rotation[k], jobs.translation[k]
-        middle = translation + rotation @ b.corners.mean(axis=0) - a.corners.mean(axis=0)
-        directions = np.concatenate([_FAN, unit(-middle)[None]])
-        hits = touching[touching[:, 0] == k]
-        first = surfaces.trees.triangles[hits[:, 1]]
-        second = surfaces.trees.triangles[hits[:, 2]] @ rotation.T + translation
-        if a.convex and b.convex:
-            if len(a.edges) * len(b.edges) <= _EDGES:
-                square = _square_to(a.edges[None], (b.edges @ rotation.T)[None])
-            else:
-                square = _square_to(_edges(first), _edges(second))
-            square = square.reshape(-1, 3)
-            directions = np.concatenate([directions, b.normals @ rotation.T, -a.normals, square, -square])
-            directions = directions[(directions != 0).any(axis=1)]
-        ways = _hulls_part(a, b, rotation, translation, directions)
-        order = np.argsort(ways, kind="stable")
-        depth[k], push[k] = ways[order[0]], directions[order[0]]
-        if a.convex and b.convex:
+        convex = overlap(surfaces, jobs, k)
+        if convex is not None:
+            depth[k], push[k] = convex.depth, convex.push
             continue
+        a, b = surfaces.surface(int(jobs.a[k])), surfaces.surface(int(jobs.b[k]))
+        alone, rotation, translation = jobs.only(np.array([k])), jobs.rotation[k], jobs.translation[k]
+        middle = translation + rotation @ b.corners.mean(axis=0) - a.corners.mean(axis=0)
+        directions = np.concatenate([FAN, unit(-middle)[None]])
+        hits = touching_triangles(surfaces, alone, touch)
+        window[k] = _FIRST_WINDOW * min(sizes[jobs.a[k]], sizes[jobs.b[k]])
         if len(hits):
-            first, second = first[:_TOUCHING], second[:_TOUCHING]
-            normals = np.concatenate([unit_normals(first), unit_normals(second)])
-            square = _shortest(first, second, _square_to(_edges(first), _edges(second)))
-            chosen, offset = np.concatenate([normals, -normals, square, directions[order[:_OTHERS]]]), 0.0
+            pairs = hits[np.linspace(0, len(hits) - 1, min(len(hits), _TOUCHING)).astype(np.int64)]
+            ways, needed = _ways_apart(*pair_triangles(surfaces, alone, pairs), a, b)
+            pushes, normals = _pushes(ways, needed, touch)
+            square = unit(np.cross(normals[:, None], normals[None])[np.triu_indices(len(normals), 1)])
+            directions = np.concatenate([directions, normals, -normals, square, -square])
+            lengths = np.linalg.norm(pushes, axis=1)
+            first.append(_Trials(np.full(len(pushes), k), unit(pushes), np.zeros(len(pushes))))
+            window[k] = np.clip(2 * lengths.min(initial=window[k]), _NARROWEST * window[k], window[k])
         else:
-            points = nearest_points(surfaces, jobs.only(np.array([k])), touch)
+            points = nearest_points(surfaces, alone, touch)
             # Just beyond where they begin to touch.
-            chosen, offset = unit(points.on_b - points.on_a), float(points.distance[0]) * (1 + 1e-9) + 10 * touch
-        trials += [(k, d, offset) for d in chosen if d.any()]
-    if trials:
-        job, direction, offset = zip(*trials, strict=True)
-        _push(surfaces, jobs, _Trials(np.array(job), np.array(direction), np.array(offset)), depth, push, touch)
+            offset = points.distance * (1 + 1e-9) + 10 * touch
+            first.append(_Trials(np.array([k]), unit(points.on_b - points.on_a), offset))
+        directions = directions[directions.any(axis=1)]
+        apart = _hulls_part(a, b, rotation, translation, directions)
+        order = np.argsort(apart, kind="stable")
+        depth[k], push[k] = apart[order[0]], directions[order[0]]
+        if len(hits):
+            others.append(_Trials(np.full(_OTHERS, k), directions[order[:_OTHERS]], np.zeros(_OTHERS)))
+    for trials in (first, others):
+        if trials:
+            job, direction, offset = (np.concatenate([getattr(t, f) for t in trials]) for f in _Trials.__slots__)
+            some = _Trials(job, direction, offset).only(np.asarray(direction.any(axis=1)))
+            _push(surfaces, jobs, some, depth, push, window.copy(), touch)
     return depth, push
 
 
-def _push(surfaces: Surfaces, jobs: Jobs, trials: _Trials, depth: Floats, push: Floats, touch: float) -> None:
+def overlap(surfaces: Surfaces, jobs: Jobs, k: int) -> Overlap | None:
+    """Return how two convex bodies overlap; None where one of them is not convex."""
+    a, b = surfaces.surface(int(jobs.a[k])), surfaces.surface(int(jobs.b[k]))
+    if a.gauss is None or b.gauss is None:
+        return None
+    return Overlap(a.corners, b.corners, a.gauss, b.gauss, jobs.rotation[k], jobs.translation[k])
+
+
+def touching_triangles(surfaces: Surfaces, job: Jobs, touch: float) -> Ints:
+    """Return all pairs of triangles of one job that are at no distance, (t, 2)."""
+    near = Search(surfaces.trees, job, np.array([np.inf]), touch).within(touch)[:, 1:]
+    parts = [near[i : i + _BLOCK] for i in range(0, len(near), _BLOCK)]
+    hits = [p[nearest(*pair_triangles(surfaces, job, p)).distance <= touch] for p in parts]
+    return np.concatenate([near[:0], *hits])
+
+
+def _push(
+    surfaces: Surfaces, jobs: Jobs, trials: _Trials, depth: Floats, push: Floats, window: Floats, touch: float
+) -> None:
     """Try pushes in windows that grow, until one of a job separates it; what is longer cannot be better."""
-    sizes = np.linalg.norm(surfaces.trees.half[surfaces.trees.roots], axis=1)
-    window = 2 * _FIRST_WINDOW * np.minimum(sizes[jobs.a], sizes[jobs.b])
     while len(trials.job):
         moved = _moved(jobs, trials.job, trials.direction * trials.offset[:, None])
         ways = escapes(surfaces.trees, moved, trials.direction, np.minimum(window, depth)[trials.job])
@@ -118,35 +142,97 @@ def _moved(jobs: Jobs, of: Ints, push: Floats) -> Jobs:
     return Jobs(jobs.a, jobs.b, jobs.rotation, jobs.translation - push, np.arange(len(of)))
 
 
+def pair_triangles(surfaces: Surfaces, job: Jobs, pairs: Ints) -> tuple[Floats, Floats]:
+    """Return the triangles of pairs of one job, (t, 3, 3) each, in the frame of a."""
+    triangles = surfaces.trees.triangles
+    return triangles[pairs[:, 0]], triangles[pairs[:, 1]] @ job.rotation[0].T + job.translation[0]
+
+
 def _hulls_part(a: Surface, b: Surface, rotation: Floats, translation: Floats, directions: Floats) -> Floats:
     """Return how far to push a in each direction until its hull is beside that of b, (d,)."""
     far = (b.corners @ (directions @ rotation).T).max(axis=0) + directions @ translation
     return np.maximum(far - (a.corners @ directions.T).min(axis=0), 0)
 
 
+def off_planes(a: Floats, b: Floats, first: Surface, second: Surface) -> tuple[Floats, Floats]:
+    """Return directions, (k, 4, 3), and how far triangles of a go along them to be beside those of b, (k, 4).
+
+    A triangle is pushed out of the other's plane, to the outside where that is known; inf where there is no such way.
+    """
+    normal_a, normal_b = (unit_normals(t) for t in (a, b))
+    over_b = np.einsum("kci,ki->kc", a - b[:, :1], normal_b)
+    over_a = np.einsum("kci,ki->kc", b - a[:, :1], normal_a)
+    ways = np.stack([-over_b.min(axis=1), over_b.max(axis=1), -over_a.min(axis=1), over_a.max(axis=1)], axis=1)
+    directions = np.stack([normal_b, -normal_b, -normal_a, normal_a], axis=1)
+    ways = np.where(directions.any(axis=2), np.maximum(ways, 0), np.inf)
+    # Columns 1 and 3 push into the inside.
+    ways[:, 1] = np.inf if second.outward else ways[:, 1]
+    ways[:, 3] = np.inf if first.outward else ways[:, 3]
+    return directions, ways
+
+
+def _ways_apart(a: Floats, b: Floats, first: Surface, second: Surface) -> tuple[Floats, Floats]:
+    """Return directions and ways as `off_planes` does, and the two shortest of those square to edges, (k, 6)."""
+    planes, ways = off_planes(a, b, first, second)
+    axes = unit(np.cross(_edges(a)[:, :, None], _edges(b)[:, None])).reshape(len(a), 9, 3)
+    axes = np.concatenate([axes, -axes], axis=1)
+    square = (b @ axes.transpose(0, 2, 1)).max(axis=1) - (a @ axes.transpose(0, 2, 1)).min(axis=1)
+    square = np.where(axes.any(axis=2), np.maximum(square, 0), np.inf)
+    best = np.argsort(square, axis=1, kind="stable")[:, :2]
+    axes, square = np.take_along_axis(axes, best[..., None], axis=1), np.take_along_axis(square, best, axis=1)
+    return np.concatenate([planes, axes], axis=1), np.concatenate([ways, square], axis=1)
+
+
 def _edges(triangles: Floats) -> Floats:
     return np.roll(triangles, -1, axis=1) - triangles
 
 
-def _square_to(first: Floats, second: Floats) -> Floats:
-    """Return unit vectors square to each edge of one and of the other, (t, e, 3) and (t, f, 3) to (t, e * f, 3)."""
-    found = unit(np.cross(first[:, :, None], second[:, None]))
-    return found.reshape(len(first), first.shape[1] * second.shape[1], 3)
+def _pushes(directions: Floats, ways: Floats, touch: float) -> tuple[Floats, Floats]:
+    """Return the shortest pushes, (p, 3), that take each pair of triangles apart in one of its ways, (t, 6), or nearly.
+
+    Also returns the normals of planes, (n, 3), that touching triangles leave soonest.
+    """
+    found, needed = list[Floats](), list[Floats]()
+    rows = np.arange(len(ways))
+    for columns in (slice(0, 4), slice(0, 6)):
+        best = np.argmin(ways[:, columns], axis=1)
+        chosen, way = directions[rows, best], ways[rows, best]
+        chosen, way = chosen[np.isfinite(way)], way[np.isfinite(way)]
+        once, which = np.unique(np.round(chosen, _DIGITS), axis=0, return_inverse=True)
+        most = np.full(len(once), touch)
+        np.maximum.at(most, which.ravel(), way)
+        order = np.argsort(-most, kind="stable")[:_WAYS]
+        # The direction itself, not rounded.
+        found.append(chosen[[int(np.argmax(which.ravel() == i)) for i in order]].reshape(-1, 3))
+        needed.append(most[order])
+    tried = [f * n[:, None] for f, n in zip(found, needed, strict=True)]
+    tried += [_meeting(f, n, many) for f, n in zip(found, needed, strict=True) for many in (2, 3)]
+    pushes = np.concatenate(tried)
+    lengths = np.linalg.norm(pushes, axis=1)
+    # What a push leaves to be done, where triangles are still not apart.
+    left = np.zeros(len(pushes))
+    for i in range(0, len(ways), 256):
+        short = ways[i : i + 256, :, None] - directions[i : i + 256] @ pushes.T
+        left = np.maximum(left, short.min(axis=1).max(axis=0))
+    order = np.argsort(lengths + 2 * left, kind="stable")
+    once = np.unique(np.round(unit(pushes[order]), _DIGITS), axis=0, return_index=True)[1]
+    return pushes[order[np.sort(once)[:_PUSHES]]], found[0][-4:]
 
 
-def _shortest(first: Floats, second: Floats, axes: Floats) -> Floats:
-    """Return the two of the axes (t, c, 3), either way, that triangles are pushed apart along soonest, (2 t, 3)."""
-    axes = np.concatenate([axes, -axes], axis=1)
-    ways = (second @ axes.transpose(0, 2, 1)).max(axis=1) - (first @ axes.transpose(0, 2, 1)).min(axis=1)
-    ways[(axes == 0).all(axis=2)] = np.inf
-    best = np.argsort(ways, axis=1)[:, :2]
-    return np.take_along_axis(axes, best[..., None], axis=1).reshape(-1, 3)
+def _meeting(normals: Floats, ways: Floats, many: int) -> Floats:
+    """Return the shortest pushes that reach so many planes at once, (p, 3): none where the planes are parallel."""
+    chosen = np.array(list(combinations(range(len(normals)), many)), dtype=np.int64).reshape(-1, many)
+    planes = normals[chosen]
+    products = planes @ planes.transpose(0, 2, 1)
+    sound = np.linalg.det(products) > 1e-9
+    weights = np.linalg.solve(products[sound], ways[chosen][sound][..., None])
+    # With a negative weight, one of the planes is left sooner without that one.
+    pushes = (planes[sound].transpose(0, 2, 1) @ weights)[..., 0]
+    return pushes[(weights >= 0).all(axis=(1, 2))]
 
 
 def nearest_points(surfaces: Surfaces, job: Jobs, touch: float) -> Nearest:
     """Return where the surfaces of one job, which do not touch, are nearest to each other, in the frame of a."""
     alone = Jobs(job.a, job.b, job.rotation, job.translation, np.zeros(1, dtype=np.int64))
     found = Search(surfaces.trees, alone, np.array([np.inf]), touch).run()
-    triangles = surfaces.trees.triangles
-    moved = triangles[found.triangle_b] @ job.rotation[0].T + job.translation[0]
-    return nearest(triangles[found.triangle_a], moved)
+    return nearest(*pair_triangles(surfaces, job, np.column_stack([found.triangle_a, found.triangle_b])))

@@ -15,6 +15,7 @@ from ..geometry.topology import Bools, Floats, Ints
 from ..geometry.triangle_search import Jobs
 from ..geometry.triangle_tree import Forest, forest
 from ..options import Collision
+from .convex_depth import GaussMap, gauss_map
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +31,7 @@ class Surface:
         box: The box that it is, if it is one.
         points: (c, 3) one corner of each component.
         corners: (v, 3) all corners, once each.
-        edges: (e, 3) unit directions of the edges, each once.
-        normals: (m, 3) unit normals, zero where a triangle has none; outwards if `convex`.
+        gauss: Directions of faces and edges, if `convex`.
     """
 
     triangles: Floats
@@ -42,8 +42,7 @@ class Surface:
     box: Box | None
     points: Floats
     corners: Floats
-    edges: Floats
-    normals: Floats
+    gauss: GaussMap | None
 
     @property
     def solid(self) -> bool:
@@ -125,14 +124,8 @@ def _made(
     triangles: Floats, enclosing: Ints, outward: bool, alike: bool, convex: bool, box: Box | None, points: Floats
 ) -> Surface:
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
-    along = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 3)
-    along = unit(along[(along != 0).any(axis=1)])
-    # One of the two directions of an edge; rounded, so that parallel edges are one.
-    largest = np.argmax(np.abs(along), axis=1)
-    along *= np.sign(np.take_along_axis(along, largest[:, None], axis=1))
-    edges = along[np.unique(np.round(along, 9), axis=0, return_index=True)[1]]
-    normals = unit_normals(triangles)
-    return Surface(triangles, enclosing, outward, alike, convex, box, points, corners, edges, normals)
+    gauss = gauss_map(triangles) if convex else None
+    return Surface(triangles, enclosing, outward, alike, convex, box, points, corners, gauss)
 
 
 def unit_normals(triangles: Floats) -> Floats:
