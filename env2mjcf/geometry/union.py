@@ -49,7 +49,7 @@ def union(analysis: Analysis, work: Work | None = None) -> Union:
     """Find what the `solids` of a mesh fill.
 
     A piece that crosses no other is left out where both of its sides are filled. Pieces that cross are united by
-    manifold3d, where that is installed and takes them; else the volume is estimated, and the triangles stay as they are.
+    manifold3d, where that is installed and takes them; else the volume is estimated, and their triangles stay.
 
     Raises:
         TooMuchWorkError: It takes more than `work` has left.
@@ -96,7 +96,12 @@ def union_diagnostics(found: Union, log: DiagnosticLog, subject: str, span: Span
         message = f"closed pieces overlap{also} and were united by manifold3d for the mass: "
         log.info("GEO245", subject, f"{message}{sums}, their union has {found.volume:.6g}", span=span)
     elif found.inner:
-        log.info("GEO245", subject, f"{inner} do not count in the mass: {sums}, their union has {found.volume:.6g}", span=span)
+        log.info(
+            "GEO245",
+            subject,
+            f"{inner} do not count in the mass: {sums}, their union has {found.volume:.6g}",
+            span=span,
+        )
 
 
 def available() -> bool:
@@ -146,7 +151,7 @@ def _bounding(pieces: list[Floats], volumes: Floats, a: Ints, b: Ints, meet: Boo
     """Tell which pieces bound what is filled, or meet others, so that this is not known, (p,)."""
     kept = np.ones(len(pieces), dtype=np.bool_)
     alone = ~np.isin(np.arange(len(pieces)), np.concatenate([a[meet], b[meet]]))
-    for i in np.flatnonzero(alone):
+    for i in np.flatnonzero(alone).tolist():
         others = np.concatenate([b[a == i], a[b == i]])
         outside = float(_around(pieces, i, others, work).sum())
         kept[i] = (outside > 0) != (outside + np.sign(volumes[i]) > 0)
@@ -160,8 +165,8 @@ def _united(pieces: list[Floats], volumes: Floats, work: Work) -> Floats | None:
     # By name, because it has no complete type hints; only here, because it is optional.
     manifold3d: Any = import_module("manifold3d")
     outward = np.flatnonzero(volumes > 0)
-    bodies = {int(i): [pieces[i]] for i in outward}
-    for i in np.flatnonzero(volumes <= 0):
+    bodies = {i: [pieces[i]] for i in outward.tolist()}
+    for i in np.flatnonzero(volumes <= 0).tolist():
         holders = outward[_around(pieces, i, outward, work) > 0]
         if not len(holders):
             return None
