@@ -11,13 +11,14 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span, counted
-from ..limits import Work
+from ..limits import COSTLY, Work
 from .analysis import Analysis
 from .orientation import winding_numbers
 from .topology import Bools, Floats, Ints
 from .triangle_search import Jobs, Search
 from .triangle_tree import forest
 
+_JOBS = 1024  # pairs of pieces that are looked at together
 _SAMPLES = 4096
 _PAIRS = 4_000_000  # pairs of samples and triangles
 # Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
@@ -63,7 +64,7 @@ def union(analysis: Analysis, work: Work | None = None) -> Union:
     a, b = _near_pairs(pieces, analysis.tolerance, work)
     if not len(a):
         return Union(triangles, total, total)
-    meet = _meet(pieces, a, b, analysis.tolerance)
+    meet = _meet(pieces, a, b, analysis.tolerance, work)
     kept = _bounding(pieces, volumes, a, b, meet, work)
     inner, triangles = int((~kept).sum()), triangles[kept[number]]
     found = Union(triangles, total, float(volumes[kept].sum()), inner)
@@ -129,11 +130,18 @@ def _near_pairs(pieces: list[Floats], tolerance: float, work: Work) -> tuple[Int
     return np.concatenate(first), np.concatenate(second)
 
 
-def _meet(pieces: list[Floats], a: Ints, b: Ints, tolerance: float) -> Bools:
+def _meet(pieces: list[Floats], a: Ints, b: Ints, tolerance: float, work: Work) -> Bools:
     """Tell which pairs of surfaces touch or cross, (p,)."""
-    count = len(a)
-    jobs = Jobs(a, b, np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.arange(count))
-    return Search(forest(pieces), jobs, np.full(count, np.inf), tolerance).run().distance <= tolerance
+    trees, out = forest(pieces), np.zeros(len(a), dtype=np.bool_)
+    size = np.array([len(p) for p in pieces])
+    for i in range(0, len(a), _JOBS):
+        first, second = a[i : i + _JOBS], b[i : i + _JOBS]
+        work.spend(COSTLY * int((size[first] + size[second]).sum()))
+        count = len(first)
+        jobs = Jobs(first, second, np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.arange(count))
+        found = Search(trees, jobs, np.full(count, np.inf), tolerance).run()
+        out[i : i + _JOBS] = found.distance <= tolerance
+    return out
 
 
 def _around(pieces: list[Floats], i: int, others: Ints, work: Work) -> Floats:
