@@ -34,16 +34,16 @@ class Placed:
 def cube_among_boxes(folder: Path, boxes: int) -> Case:
     """Return a free cube among random boxes of one density."""
     side = SIDE_OF_50 * (boxes / 50) ** (1 / 3)
-    _write_mesh(folder / "cube.g", trimesh.creation.box((1.0, 1.0, 1.0)))
+    write_mesh(folder / "cube.g", trimesh.creation.box((1.0, 1.0, 1.0)))
     robot = ["1", "cube.g Volumetric Rotational", "Connections", "0"]
-    return _scene(folder, f"boxes{boxes}", side, robot, _boxes(folder, boxes, side, boxes))
+    return scene(folder, f"boxes{boxes}", side, robot, _boxes(folder, boxes, side, boxes))
 
 
 def snake_among_boxes(folder: Path, links: int = 64, boxes: int = 50) -> Case:
     """Return a chain of boxes with a free base, whose hinges turn about y and z by turns."""
     side, length = 24.0, 0.5
     # The hinge is at the end of one link and the beginning of the next; gaps keep the neighbours of neighbours apart.
-    _write_mesh(folder / "segment.g", trimesh.creation.box((0.8 * length, 0.2, 0.2)))
+    write_mesh(folder / "segment.g", trimesh.creation.box((0.8 * length, 0.2, 0.2)))
     robot = [str(links), "segment.g Volumetric Rotational", *["segment.g Joint"] * (links - 1), "Connections"]
     robot.append(str(links - 1))
     for i in range(links - 1):
@@ -53,7 +53,7 @@ def snake_among_boxes(folder: Path, links: int = 64, boxes: int = 50) -> Case:
             f"{i} {i + 1} Revolute -0.4:0.4",
             f"{length / 2} 0 0 {turn} 0 0   0 0 0 0   {length / 2} 0 0 {-turn} 0 0",
         ]
-    return _scene(folder, "snake64", side, robot, _boxes(folder, boxes, side, 64))
+    return scene(folder, "snake64", side, robot, _boxes(folder, boxes, side, 64))
 
 
 def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
@@ -61,8 +61,8 @@ def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
     length, radius = 0.5, 0.09
     capsule = trimesh.creation.capsule(height=length - 2 * radius - 0.06, radius=radius, count=(18, 16))
     capsule.apply_translation(-capsule.centroid)
-    _write_mesh(folder / "link.g", capsule)
-    _write_mesh(folder / "base.g", trimesh.creation.box((0.3, 0.3, 0.2)))
+    write_mesh(folder / "link.g", capsule)
+    write_mesh(folder / "base.g", trimesh.creation.box((0.3, 0.3, 0.2)))
     robot = ["8", "base.g Fixed 0 0 0 0 0 0", *["link.g Joint"] * 7, "Connections", "7"]
     # The links stand along z; hinges are about z for the first one, then about x and y by turns.
     robot += ["0 1 Revolute -1:1", f"0 0 0.12 0 0 0   0 0 0 0   0 0 {length / 2} 0 0 0"]
@@ -73,7 +73,7 @@ def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
             f"0 0 {length / 2} {angles[0]}   0 0 0 0   {_turned(angles[0], length / 2)} {angles[1]}",
         ]
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.25)
-    _write_mesh(folder / "ball.g", ball)
+    write_mesh(folder / "ball.g", ball)
     rng = np.random.default_rng(SEED + 7)
     placed = []
     for i in range(obstacles):
@@ -84,9 +84,9 @@ def arm_among_obstacles(folder: Path, obstacles: int = 30) -> Case:
             placed.append(Placed("ball.g", position))
         else:
             name = f"block{i}.g"
-            _write_mesh(folder / name, trimesh.creation.box(rng.uniform(0.2, 0.6, 3)))
+            write_mesh(folder / name, trimesh.creation.box(rng.uniform(0.2, 0.6, 3)))
             placed.append(Placed(name, position, rng.uniform(-180, 180, 3)))
-    return _scene(folder, "arm7", 9.0, robot, placed)
+    return scene(folder, "arm7", 9.0, robot, placed)
 
 
 def robots_in_groups(folder: Path, number: int) -> Case:
@@ -179,7 +179,7 @@ def _boxes(folder: Path, count: int, side: float, seed: int) -> Iterable[Placed]
     rng = np.random.default_rng(SEED + seed)
     shapes = min(count, 10)
     for i in range(shapes):
-        _write_mesh(folder / f"box{i}.g", trimesh.creation.box(rng.uniform(0.5, 2.0, 3)))
+        write_mesh(folder / f"box{i}.g", trimesh.creation.box(rng.uniform(0.5, 2.0, 3)))
     for i in range(count):
         position, angles = rng.uniform(-side / 2, side / 2, 3), rng.uniform(-180, 180, 3)
         yield Placed(f"box{i % shapes}.g", position, angles)
@@ -191,7 +191,8 @@ def _turned(angles: str, z: float) -> str:
     return f"0 {z if about_x else 0} {z if not about_x and not about_y else 0}" if not about_y else f"{-z} 0 0"
 
 
-def _scene(folder: Path, name: str, side: float, robot: Sequence[str], obstacles: Iterable[Placed]) -> Case:
+def scene(folder: Path, name: str, side: float, robot: Sequence[str], obstacles: Iterable[Placed]) -> Case:
+    """Write a scene in a cubic boundary, and return it."""
     placed = list(obstacles)
     bounds = " ; ".join([f"{-side / 2!r}:{side / 2!r}"] * 3)
     lines = [f"Boundary Box [{bounds}]", "", "Multibodies", str(1 + len(placed)), "", "Active", *robot, ""]
@@ -203,10 +204,16 @@ def _scene(folder: Path, name: str, side: float, robot: Sequence[str], obstacles
     return Case(name, path)
 
 
-def _write_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Write a mesh as BYU text."""
+def write_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Write a mesh by its extension, `.g` and `.obj` with all digits and the vertices in their order."""
     vertices, faces = mesh.vertices, mesh.faces + 1
-    lines = [f"1 {len(vertices)} {len(faces)} {faces.size}", f"1 {len(faces)}"]
-    lines += [" ".join(repr(float(x)) for x in v) for v in vertices]
-    lines += [f"{a} {b} {-c}" for a, b, c in faces]
+    if path.suffix == ".stl":
+        mesh.export(path)
+        return
+    points = [" ".join(repr(float(x)) for x in v) for v in vertices]
+    if path.suffix == ".obj":
+        lines = [*(f"v {p}" for p in points), *(f"f {a} {b} {c}" for a, b, c in faces)]
+    else:
+        lines = [f"1 {len(vertices)} {len(faces)} {faces.size}", f"1 {len(faces)}", *points]
+        lines += [f"{a} {b} {-c}" for a, b, c in faces]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

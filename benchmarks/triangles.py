@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import fcl
 import numpy as np
+from pieces import Pieces
 
 import env2mjcf
 
@@ -19,9 +20,12 @@ DEPTHS = np.geomspace(1e-9, 1, 91)
 
 
 class Truth:
-    """Triangles against triangles by python-fcl, and containment by counting signed crossings of a ray."""
+    """Triangles against triangles by python-fcl, and containment by counting signed crossings of a ray.
 
-    def __init__(self, scene: env2mjcf.Scene) -> None:
+    Which pieces of a mesh are closed is taken from its analysis, or from what is `known`, by the names of mesh files.
+    """
+
+    def __init__(self, scene: env2mjcf.Scene, known: Mapping[str, Pieces] | None = None) -> None:
         self.scene = scene
         self.pairs = scene.pairs
         parts = {p.name: p for p in scene.compiled.assembly.parts()}
@@ -34,9 +38,15 @@ class Truth:
         self._centre = np.array([c.mean(axis=0) for c in corners]).reshape(-1, 3)
         self._half = np.array([(c[1] - c[0]) / 2 for c in corners]).reshape(-1, 3)
         self._box = corners
-        self._closed = [p.analysis.closed for p in chosen]
-        self._faces = [p.analysis.vertices[p.analysis.faces] for p in chosen]
-        self._points = [_one_of_each_component(p.analysis) for p in chosen]
+        of = [(known or {}).get(p.body.filename) for p in chosen]
+        self._faces = [
+            k.enclosing(p.mesh.vertices, p.mesh.faces) if k else p.analysis.vertices[p.analysis.enclosing]
+            for p, k in zip(chosen, of, strict=True)
+        ]
+        self._points = [
+            k.points(p.mesh.vertices, p.mesh.faces) if k else _one_of_each_component(p.analysis)
+            for p, k in zip(chosen, of, strict=True)
+        ]
         self._request = fcl.CollisionRequest()
 
     def poses(self, q: np.ndarray) -> np.ndarray:
@@ -83,7 +93,7 @@ class Truth:
     def _holds(self, outer: int, inner: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return whether one body, at poses a, holds another at poses b, (n,)."""
         found = np.zeros(len(a), dtype=bool)
-        if not self._closed[outer]:
+        if not len(self._faces[outer]):
             return found
         world = np.einsum("nij,cj->nci", b[:, :3, :3], self._points[inner]) + b[:, None, :3, 3]
         local = np.einsum("nji,ncj->nci", a[:, :3, :3], world - a[:, None, :3, 3])

@@ -13,7 +13,9 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from pieces import scene_of_pieces
 from table import Case, corpus_cases
 from triangles import DIRECTIONS, Truth
 from verdicts import BAND, HALVINGS, MODES, Result, examine, visited
@@ -65,7 +67,9 @@ def text(results: Sequence[Result], command: str, count: int, engine: str) -> st
             "verdicts are compared with the triangles alone; all pairs of `scene.pairs` are tested, with "
             f'`engine="{engine}"`, which is to say {HOW[engine]}. Uniform: half of '
             "them in the whole space, half with the robot's base about the obstacles. Bisected: every point that "
-            f"{HALVINGS} halvings between a free and a colliding configuration visit, onto the borders of both truths.",
+            f"{HALVINGS} halvings between a free and a colliding configuration visit, onto the borders of both truths. "
+            "The scenes called `pieces` are made at random (`benchmarks/pieces.py`): meshes of pieces, some with "
+            "holes, of which it is known which are closed.",
             "",
             f"The band is {BAND:g} of the scene's extent; numbers before a slash are disagreements in it, after the "
             "slash outside it. A false hit is judged by the distance of the triangles; a false free verdict by the "
@@ -92,15 +96,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", nargs="*", help="only these; write nothing")
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--pieces", type=int, default=40, help="scenes of random meshes in several pieces, at most")
     chosen = parser.parse_args(arguments)
     folder = os.environ.get("ENV2MJCF_CORPUS")
     if not folder:
         parser.error("ENV2MJCF_CORPUS must name the folder of real scenes")
     count = 400 if chosen.quick else chosen.count
-    cases = [c for c in corpus_cases(Path(folder)) if _complete(c) and (not chosen.scenes or c.name in chosen.scenes)]
     done = {}
-    with ProcessPoolExecutor(chosen.processes) as pool:
-        futures = [pool.submit(examine, case, count, chosen.seed, chosen.engine) for case in cases]
+    with TemporaryDirectory() as made, ProcessPoolExecutor(chosen.processes) as pool:
+        random = [scene_of_pieces(Path(made) / str(i), i) for i in range(chosen.pieces)]
+        known = {case.name: pieces for case, pieces in random}
+        every = [*(c for c in corpus_cases(Path(folder)) if _complete(c)), *(case for case, _ in random)]
+        cases = [c for c in every if not chosen.scenes or c.name in chosen.scenes]
+        futures = [pool.submit(examine, c, count, chosen.seed, chosen.engine, known.get(c.name)) for c in cases]
         for future in as_completed(futures):
             result = future.result()
             done[result.name] = result

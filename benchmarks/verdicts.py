@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from pieces import Pieces
 from table import Case
 from triangles import Truth
 
@@ -85,11 +87,16 @@ class Result:
     seconds: float
 
 
-def examine(case: Case, count: int, seed: int, engine: str = "mujoco") -> Result:
-    """Compare all verdicts on one scene; MuJoCo's are those of the cells, the exact engine's those of triangles."""
+def examine(
+    case: Case, count: int, seed: int, engine: str = "mujoco", known: Mapping[str, Pieces] | None = None
+) -> Result:
+    """Compare all verdicts on one scene; MuJoCo's are those of the cells, the exact engine's those of triangles.
+
+    Which pieces of a mesh are closed is taken from its analysis, unless it is known.
+    """
     start = time.perf_counter()
     scenes = {mode: env2mjcf.load(case.path, collision=mode, **case.options) for mode in MODES}
-    truth = Truth(scenes["auto"])
+    truth = Truth(scenes["auto"], known)
     if not scenes["auto"].space.dim or not scenes["auto"].pairs:
         count = 1
     # Scenes that differ in their dialect alone are to be asked different questions.

@@ -165,7 +165,7 @@ CATALOGUE: dict[str, str] = {
     "GEO229": "A mesh file ends with DOS's mark of the end, the byte 0x1A, which is not read.",
     "GEO230": "All points of a mesh lie in one plane; it collides as a thin plate.",
     "GEO231": "A mesh has no area: it is a point or a line.",
-    "GEO232": "A mesh is not closed; it collides as a sheet without inside.",
+    "GEO232": "A mesh, or a piece of it, is not closed; it collides as a sheet without inside.",
     "GEO233": "A closed mesh, or part of it, is wound inside out; its faces were turned round.",
     "GEO234": "Faces of a mesh are wound inconsistently; they were turned round to agree, where that is possible.",
     "GEO235": "Copies of faces were dropped.",

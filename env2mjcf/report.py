@@ -18,6 +18,7 @@ class MeshReport:
         file: The mesh as the scene names it.
         triangles: Number of triangles.
         closed, convex: What it is like.
+        solids, sheets: Number of its pieces that have an inside, and of those that have none.
         cells: Number of convex pieces that collide for it.
         note: How it was represented, in a sentence.
         certificate: How far these are from the mesh; None for what is only drawn.
@@ -27,6 +28,8 @@ class MeshReport:
     triangles: int
     closed: bool
     convex: bool
+    solids: int
+    sheets: int
     cells: int
     note: str
     certificate: Certificate | None = None
@@ -85,6 +88,8 @@ def report(compiled: Compiled) -> Report:
                 len(part.mesh.faces),
                 part.analysis.closed,
                 part.analysis.convex,
+                int(part.analysis.closed_components.sum()),
+                int((~part.analysis.closed_components).sum()),
                 len(shape.pieces) if shape else 0,
                 shape.note if shape else "drawn only",
                 part.certificate,

@@ -17,7 +17,7 @@ from ..summary import DofSummary, RobotSummary, SceneSummary
 from .terminal import one_line
 
 if TYPE_CHECKING:
-    from ..report import Report
+    from ..report import MeshReport, Report
     from ..simulation.verdicts import PairCount
 
 _UNITS = {"turns": "turns", "pi": "pi rad", "length": "length"}
@@ -51,7 +51,7 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     yield Text(f"\nMeshes, collision {report.collision}", "bold")
     table = _table("file", "triangles", "closed", "convex", "cells", "collides as", right=(1, 4))
     for mesh in report.meshes:
-        table.add_row(*_cells(mesh.file, mesh.triangles, _yes(mesh.closed), _yes(mesh.convex), mesh.cells, mesh.note))
+        table.add_row(*_cells(mesh.file, mesh.triangles, _closed(mesh), _yes(mesh.convex), mesh.cells, mesh.note))
     yield _indented(table)
     proofs = {m.file: m.certificate for m in report.meshes if m.certificate is not None}
     if proofs:
@@ -147,6 +147,10 @@ def _list(names: Sequence[str], most: int = 12) -> str:
     shown = ", ".join(one_line(n) for n in names[:most])
     more = f", and {len(names) - most} more" if len(names) > most else ""
     return f"{len(names)}: {shown}{more}" if names else "none"
+
+
+def _closed(mesh: MeshReport) -> str:
+    return f"{mesh.solids} of {mesh.solids + mesh.sheets}" if mesh.solids and mesh.sheets else _yes(mesh.closed)
 
 
 def _yes(value: bool) -> str:

@@ -224,7 +224,10 @@ def mesh_diagnostics(
     if analysis.flat:
         warn("GEO230", "all points lie in one plane: the mesh is a sheet without inside", "it collides as a thin plate")
     elif not analysis.closed:
-        warn("GEO232", _open_message(analysis), "it collides as a sheet: a body wholly inside it does not count as touching")
+        what, others = "it collides as a sheet", ""
+        if analysis.closed_components.any():
+            what, others = "what is open collides as a sheet", "; the closed pieces are solid"
+        warn("GEO232", _open_message(analysis), f"{what}: a body wholly inside it does not count as touching{others}")
     # A sheet has no outside, so that its winding says nothing.
     if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
@@ -234,8 +237,9 @@ def mesh_diagnostics(
     if analysis.crowded_edges:
         note("GEO239", f"{analysis.crowded_edges} edges have more than two faces")
     if analysis.components > 1:
-        kinds = "" if analysis.flat else f", {int(analysis.closed_components.sum())} of them closed"
-        note("GEO237", f"the mesh is in {analysis.components} pieces{kinds}")
+        closed = int(analysis.closed_components.sum())
+        kinds = ", all closed" if analysis.closed else f", {closed} closed and {analysis.components - closed} open"
+        note("GEO237", f"the mesh is in {analysis.components} pieces{kinds if closed else ''}")
     if analysis.unused_vertices:
         note("GEO238", f"{analysis.unused_vertices} vertices are used by no face")
 
@@ -244,7 +248,7 @@ def _open_message(analysis: Analysis) -> str:
     """Say how much of a surface is open, and where."""
     count = int((~analysis.closed_components).sum())
     whole = "the surface is open"
-    if analysis.components > 1:
+    if analysis.closed_components.any():
         whole = f"{count} of {analysis.components} pieces {'is' if count == 1 else 'are'} open"
     loose = ~analysis.closed_components[analysis.component]
     table = edges(apart(analysis.faces[loose], analysis.component[loose]))

@@ -144,7 +144,7 @@ def _without_copies(faces: Ints, piece: Ints | None = None) -> tuple[Bools, Bool
 
 
 def _judged(
-    points: Floats, faces: Ints, high: Bools, piece: Ints, tolerance: float, hollow: bool = True
+    points: Floats, faces: Ints, high: Bools, piece: Ints, tolerance: float, signs: tuple[int, ...] = ()
 ) -> _Judged:
     """Pick the faces that close each piece: which copies count, and whether faces of no height do.
 
@@ -157,7 +157,7 @@ def _judged(
         high: (m,) which of them have a height.
         piece: (m,) -1 for faces that are of none.
         tolerance: Length that counts as nothing.
-        hollow: Whether a piece without copies that encloses nothing may be closed.
+        signs: Those that the volume of a closed piece may have; without any, it may be nothing, if there are no copies.
     """
     some = piece >= 0
     one, both = (mask & some for mask in _without_copies(faces, piece))
@@ -176,10 +176,10 @@ def _judged(
             even = np.zeros(len(closed), dtype=np.bool_)
             even[label] = True
             even[label[(table.faces % 2 == 1)[table.of_corner].any(axis=1)]] = False
-            if mask is both or not hollow:
+            if mask is both or signs:
                 # A sheet with two sides encloses nothing.
-                sums = (np.bincount(label, x[rows], minlength=len(closed)) for x in (volumes, noise))
-                even &= np.abs(next(sums)) > next(sums)
+                volume, nothing = (np.bincount(label, x[rows], minlength=len(closed)) for x in (volumes, noise))
+                even &= np.logical_or.reduce([sign * volume > nothing for sign in signs or (1, -1)])
             changed = some & even[piece]
             keep[changed], counted[changed] = mask[changed], chosen[changed]
             closed |= even
@@ -205,11 +205,11 @@ def _take_apart(
     closed = [found.closed]
     made = len(found.closed)
     taken: list[Ints] = []
-    for links in (_by_file, _by_wedges, _by_wedges_outside, _by_edges):
+    for links, signs in _LINKS:
         if not len(left):
             break
         label = connected(len(left), *links(points, own[left], faces[left], work))
-        judged = _judged(points, faces[left], high[left], label, tolerance, hollow=False)
+        judged = _judged(points, faces[left], high[left], label, tolerance, signs)
         found.piece[left], found.keep[left], found.counted[left] = label + made, judged.keep, judged.counted
         closed.append(judged.closed)
         made += len(judged.closed)
@@ -274,6 +274,16 @@ def _by_edges(points: Floats, own: Ints, faces: Ints, work: Work) -> tuple[Ints,
     """Link faces that share a welded edge."""
     here, there, _ = edges(faces).neighbours()
     return here // 3, there // 3
+
+
+_LINKS = (
+    (_by_file, (1, -1)),
+    # Taken for the outside of solids that touch, it would leave their walls behind, which bound nothing.
+    (_by_wedges, (1,)),
+    (_by_wedges_outside, (-1,)),
+    (_by_edges, (1, -1)),
+)
+"""How faces are linked, one way after the other, and the signs of the volumes of what is closed then."""
 
 
 def _of_copies(faces: Ints) -> tuple[Ints, Ints, Ints]:

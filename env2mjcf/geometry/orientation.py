@@ -117,7 +117,7 @@ def _within(vertices: Floats, outer: Ints, inner: Sequence[Ints], work: Work) ->
     unsure = np.arange(len(inner))
     for nth in range(_PROBES):
         # The middle of a face stays clear of edges that surfaces may share; of two that share a wall, it may lie in it.
-        probes = np.array([vertices[inner[i][nth * len(inner[i]) // _PROBES]].mean(axis=0) for i in unsure])
+        probes = np.array([vertices[inner[i][nth * len(inner[i]) // _PROBES]].mean(axis=0) for i in unsure.tolist()])
         around = np.abs(winding_numbers(probes.reshape(-1, 3), vertices, outer, work))
         out[unsure] = around > 0.5
         unsure = unsure[np.abs(around - 0.5) < 0.25]

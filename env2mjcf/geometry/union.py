@@ -11,13 +11,14 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Span, counted
-from ..limits import Work
+from ..limits import COSTLY, Work
 from .analysis import Analysis
 from .orientation import winding_numbers
 from .topology import Bools, Floats, Ints
 from .triangle_search import Jobs, Search
 from .triangle_tree import forest
 
+_JOBS = 1024  # pairs of pieces that are looked at together
 _SAMPLES = 4096
 _PAIRS = 4_000_000  # pairs of samples and triangles
 # Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
@@ -49,7 +50,7 @@ def union(analysis: Analysis, work: Work | None = None) -> Union:
     """Find what the `solids` of a mesh fill.
 
     A piece that crosses no other is left out where both of its sides are filled. Pieces that cross are united by
-    manifold3d, where that is installed and takes them; else the volume is estimated, and the triangles stay as they are.
+    manifold3d, where that is installed and takes them; else the volume is estimated, and their triangles stay.
 
     Raises:
         TooMuchWorkError: It takes more than `work` has left.
@@ -63,7 +64,7 @@ def union(analysis: Analysis, work: Work | None = None) -> Union:
     a, b = _near_pairs(pieces, analysis.tolerance, work)
     if not len(a):
         return Union(triangles, total, total)
-    meet = _meet(pieces, a, b, analysis.tolerance)
+    meet = _meet(pieces, a, b, analysis.tolerance, work)
     kept = _bounding(pieces, volumes, a, b, meet, work)
     inner, triangles = int((~kept).sum()), triangles[kept[number]]
     found = Union(triangles, total, float(volumes[kept].sum()), inner)
@@ -96,7 +97,12 @@ def union_diagnostics(found: Union, log: DiagnosticLog, subject: str, span: Span
         message = f"closed pieces overlap{also} and were united by manifold3d for the mass: "
         log.info("GEO245", subject, f"{message}{sums}, their union has {found.volume:.6g}", span=span)
     elif found.inner:
-        log.info("GEO245", subject, f"{inner} do not count in the mass: {sums}, their union has {found.volume:.6g}", span=span)
+        log.info(
+            "GEO245",
+            subject,
+            f"{inner} do not count in the mass: {sums}, their union has {found.volume:.6g}",
+            span=span,
+        )
 
 
 def available() -> bool:
@@ -124,11 +130,18 @@ def _near_pairs(pieces: list[Floats], tolerance: float, work: Work) -> tuple[Int
     return np.concatenate(first), np.concatenate(second)
 
 
-def _meet(pieces: list[Floats], a: Ints, b: Ints, tolerance: float) -> Bools:
+def _meet(pieces: list[Floats], a: Ints, b: Ints, tolerance: float, work: Work) -> Bools:
     """Tell which pairs of surfaces touch or cross, (p,)."""
-    count = len(a)
-    jobs = Jobs(a, b, np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.arange(count))
-    return Search(forest(pieces), jobs, np.full(count, np.inf), tolerance).run().distance <= tolerance
+    trees, out = forest(pieces), np.zeros(len(a), dtype=np.bool_)
+    size = np.array([len(p) for p in pieces])
+    for i in range(0, len(a), _JOBS):
+        first, second = a[i : i + _JOBS], b[i : i + _JOBS]
+        work.spend(COSTLY * int((size[first] + size[second]).sum()))
+        count = len(first)
+        jobs = Jobs(first, second, np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.arange(count))
+        found = Search(trees, jobs, np.full(count, np.inf), tolerance).run()
+        out[i : i + _JOBS] = found.distance <= tolerance
+    return out
 
 
 def _around(pieces: list[Floats], i: int, others: Ints, work: Work) -> Floats:
@@ -146,7 +159,7 @@ def _bounding(pieces: list[Floats], volumes: Floats, a: Ints, b: Ints, meet: Boo
     """Tell which pieces bound what is filled, or meet others, so that this is not known, (p,)."""
     kept = np.ones(len(pieces), dtype=np.bool_)
     alone = ~np.isin(np.arange(len(pieces)), np.concatenate([a[meet], b[meet]]))
-    for i in np.flatnonzero(alone):
+    for i in np.flatnonzero(alone).tolist():
         others = np.concatenate([b[a == i], a[b == i]])
         outside = float(_around(pieces, i, others, work).sum())
         kept[i] = (outside > 0) != (outside + np.sign(volumes[i]) > 0)
@@ -160,8 +173,8 @@ def _united(pieces: list[Floats], volumes: Floats, work: Work) -> Floats | None:
     # By name, because it has no complete type hints; only here, because it is optional.
     manifold3d: Any = import_module("manifold3d")
     outward = np.flatnonzero(volumes > 0)
-    bodies = {int(i): [pieces[i]] for i in outward}
-    for i in np.flatnonzero(volumes <= 0):
+    bodies = {i: [pieces[i]] for i in outward.tolist()}
+    for i in np.flatnonzero(volumes <= 0).tolist():
         holders = outward[_around(pieces, i, outward, work) > 0]
         if not len(holders):
             return None

@@ -12,6 +12,7 @@ PACKAGES = {
     "planning": ("ompl",),
     "dask": ("dask", "distributed"),
     "decompose": ("coacd",),
+    "solids": ("manifold3d",),
 }
 
 

@@ -73,11 +73,10 @@ class Truth:
             thing.setTransform(self._fcl.Transform(poses[name][:3, :3], poses[name][:3, 3]))
 
     def _holds(self, outer: str, inner: str, poses: dict[str, np.ndarray]) -> bool:
-        if not self._parts[outer].analysis.closed:
-            return False
+        analysis = self._parts[outer].analysis
         a, b = poses[outer], poses[inner]
         corner = b[:3, :3] @ self._triangles[inner][0, 0] + b[:3, 3]
-        return inside(a[:3, :3].T @ (corner - a[:3, 3]), self._triangles[outer])
+        return inside(a[:3, :3].T @ (corner - a[:3, 3]), analysis.vertices[analysis.enclosing])
 
 
 def inside(point: np.ndarray, triangles: np.ndarray) -> bool:

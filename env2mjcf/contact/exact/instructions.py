@@ -18,7 +18,7 @@ from ..containment import ROUNDING
 from ..surfaces import Surfaces
 from .motions import Motions
 from .tables import LANES, BoundaryKind, Tables, packed
-from .wide_tree import WideTree, box_tree, depth, wide_tree
+from .wide_tree import box_tree, depth, wide_tree
 
 
 def scene_tables(
