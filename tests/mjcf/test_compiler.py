@@ -180,6 +180,31 @@ def test_exact_boxes_become_box_geoms_on_request(tmp_path: Path) -> None:
     np.testing.assert_array_equal(boxes.in_collision(q), meshes.in_collision(q))
 
 
+@pytest.mark.parametrize("collision", ["auto", "hull", "solid", "coacd", "surface"])
+def test_a_box_geom_stands_only_where_a_solid_collides(collision: str, tmp_path: Path) -> None:
+    # A small cube wholly inside a large one touches no surface of it.
+    path = write_scene(tmp_path, free_cube("room.g 0 0 0 0 0 0"), room=box_mesh(3, 3, 3))
+    scene = env2mjcf.load(path, primitives=True, collision=collision, cache=False)
+    kinds = {int(scene.model.geom(n).type[0]) for n in ("cube:0", "room:0")}
+    surface = collision == "surface"
+    assert (kinds == {int(mujoco.mjtGeom.mjGEOM_BOX)}) is not surface
+    for engine in ("exact", "mujoco"):
+        assert scene.in_collision(np.zeros(scene.space.dim), engine=engine) is not surface
+        assert scene.in_collision(np.array([2.8, 0, 0, 0, 0, 0]), engine=engine)
+    told = [d for d in scene.diagnostics if d.code == "MJC416"]
+    assert len(told) == surface
+    if surface:
+        assert "collision='surface'" in told[0].message
+
+
+def test_primitives_that_find_no_box_are_reported(tmp_path: Path) -> None:
+    tetrahedron = "1 4 4 12 1 4 0 0 0 1 0 0 0 1 0 0 0 1 1 3 -2 1 2 -4 2 3 -4 1 4 -3"
+    robot = "1\nsolid.g Planar Rotational\nConnections\n0\n"
+    path = write_scene(tmp_path, free_cube(robot=robot), solid=tetrahedron)
+    assert [d.code for d in env2mjcf.load(path, primitives=True).diagnostics].count("MJC416") == 1
+    assert "MJC416" not in [d.code for d in env2mjcf.load(path).diagnostics]
+
+
 def test_a_link_may_be_called_world(tmp_path: Path) -> None:
     robot = "1\nworld.g Volumetric Rotational\nConnections\n0\n"
     scene = env2mjcf.load(write_scene(tmp_path, free_cube(robot=robot), world=box_mesh(1, 1, 1)))

@@ -1,4 +1,4 @@
-"""MOVIE.BYU meshes, `.g` or `.byu`, also for trimesh, and the GMS `.dat` meshes of the oldest planner (docs/format/meshes.md)."""
+"""MOVIE.BYU meshes (`.g`, `.byu`), also for trimesh, and GMS `.dat` meshes, the oldest (docs/format/meshes.md)."""
 
 from __future__ import annotations
 
