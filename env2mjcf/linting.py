@@ -37,6 +37,7 @@ from .system.files import open_regular
 _ROOT_TAG = re.compile(rb"(?>(?:<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*)<([A-Za-z_][\w:.\-]*)", re.DOTALL)
 _SCENE_TAGS = ("environment", *PROBLEM_TAGS)
 _MOST_SAID = 500
+_OPTIONS = tuple(f.name for f in dataclasses.fields(Options))
 _SNIFFED_BYTES = 1 << 16
 
 
@@ -187,6 +188,9 @@ def _lint_file(path: str, kind: Kind, options: Options) -> Sequence[Diagnostic]:
     except Env2MjcfError as error:
         return error.diagnostics
     except Exception as error:  # the other files, and what was found in this one, are worth telling
+        # Errors about an option begin with its name; it is as wrong for the other files.
+        if type(error) is ValueError and str(error).startswith(_OPTIONS):
+            raise
         return *log, _fault(path, error)
     return tuple(log)
 

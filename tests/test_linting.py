@@ -7,8 +7,9 @@ import re
 from pathlib import Path
 
 import pytest
+from mujoco import FatalError
 
-from env2mjcf import Options, Severity
+from env2mjcf import Options, Severity, linting
 from env2mjcf.cli.lint import github_annotation
 from env2mjcf.cli.main import main
 from env2mjcf.errors import Diagnostic, Span
@@ -276,16 +277,24 @@ class TestProgram:
         assert (status, out) == (2, "")
         assert err
 
-    def test_a_fault_names_the_file(self, folder, run, monkeypatch):
-        (folder / "a.env").write_text(scene())
+    @pytest.mark.parametrize("error", [RuntimeError("oh"), ValueError("a fault"), MemoryError(), FatalError("oh")])
+    def test_a_fault_in_one_file_leaves_the_findings_of_the_others(self, folder, run, monkeypatch, error):
+        for name in ("a.env", "b.env", "c.env"):
+            (folder / name).write_text(scene("gone.g"))
+        resolve = linting.resolve_all
 
-        def broken(*_):
-            raise RuntimeError("oh")
+        def broken(environment, *rest):
+            if environment.name == "b" and environment.multibodies[0].bodies[0].filename == "cube.g":
+                raise error
+            return resolve(environment, *rest)
 
-        monkeypatch.setattr("env2mjcf.linting._lint_scene", broken)
-        status, _, err = run("a.env")
-        assert status == 4
-        assert "RuntimeError: oh; while linting a.env" in err
+        monkeypatch.setattr("env2mjcf.linting.resolve_all", broken)
+        status, out, err = run("a.env", "b.env", "c.env", "--json")
+        files = json.loads(out)["files"]
+        assert (status, err) == (4, "")
+        assert [[d["code"] for d in f["diagnostics"]] for f in files] == [["GEO201"], ["GEO201", "MJC407"], ["GEO201"]]
+        said = files[1]["diagnostics"][1]["message"]
+        assert ("not enough memory" if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}") in said
 
 
 class TestGithubAnnotations:

@@ -71,10 +71,10 @@ class Lint:
             print(summary)
         if not results:
             remark("lint: no scene, robot or mesh was found")
-        if not all(os.path.lexists(path) for path in self.paths):
-            return BAD_INPUT  # what the error says
         if any(d.code == FAULT_CODE for r in results for d in r.diagnostics):
             return FAULT
+        if not all(os.path.lexists(path) for path in self.paths):
+            return BAD_INPUT  # what the error says
         return FINDING if errors or (self.options.strict and warnings) else DONE
 
 

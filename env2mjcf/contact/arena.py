@@ -61,7 +61,7 @@ def lack(call: Call, model: mujoco.MjModel, data: mujoco.MjData) -> str:
     data.warning.number[:] = counts + raised
     if said:
         return said
-    room = f"its memory of {model.narena / 2**20:.0f} MB"
+    room = f"its memory of {model.narena / 2**20:.3g} MB"
     if raised[_FULL[0]] > 0:
         return f"{room} is full after {data.ncon} contacts"
     return f"{room} has no room for the forces of {data.ncon} contacts" if raised[_FULL[1]] > 0 else ""
@@ -90,7 +90,7 @@ def collide(model: mujoco.MjModel, data: mujoco.MjData) -> str:
         return " ".join(str(error).split())
     if data.warning[full].number == before:
         return ""
-    return f"its memory of {model.narena / 2**20:.0f} MB is full after {data.ncon} contacts"
+    return f"its memory of {model.narena / 2**20:.3g} MB is full after {data.ncon} contacts"
 
 
 def collide_in_parts(

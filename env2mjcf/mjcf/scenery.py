@@ -56,7 +56,7 @@ LEAST_MEMORY, MOST_MEMORY = 8 << 20, 1 << 30
 for. Memory is not used, only reserved, until something touches."""
 
 # Measured on shells pressed into each other: contacts of two cells, and of the cells of one body with another body.
-_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 32
+_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 20
 
 
 def possible_contacts(assembly: Assembly, pairs: PairTable, options: Options) -> NDArray[np.int64]:
@@ -80,8 +80,8 @@ def memory(assembly: Assembly, pairs: PairTable, options: Options) -> int:
         return 0
     # What MuJoCo would choose, at most: its solver needs room, too.
     total = sum(r.kinematics.dim for r in assembly.robots)
-    needed += (16 << 20) + 36_000 * total + 72 * total * total
-    return min(1 << (needed - 1).bit_length(), MOST_MEMORY)
+    chosen = (16 << 20) + 36_000 * total + 72 * total * total
+    return 0 if chosen > MOST_MEMORY else min(1 << (chosen + needed - 1).bit_length(), MOST_MEMORY)
 
 
 def _cells(part: Part, options: Options) -> int:

@@ -14,7 +14,7 @@ from ..errors import Span
 from ..geometry.assembly import Assembly
 from ..mjcf.compiler import Document
 
-_NO_MEMORY = "Could not allocate memory"
+_NO_MEMORY = ("Could not allocate memory", "out of memory")
 _QUOTED = re.compile(r"'([^']+)'")
 _LINE = re.compile(r"\bline (\d+)")
 _NAME = re.compile(r'\b(?:name|mesh|body1|geom1|joint)="([^"]+)"')
@@ -62,7 +62,7 @@ def _compiled(
         log.fail("MJC402", document.name, f"MuJoCo {mujoco.__version__} warns: {said}", hint=hint)
     except ValueError as error:
         said = " ".join(str(error).split())
-        if _NO_MEMORY in said:
+        if any(words in said for words in _NO_MEMORY):
             message = f"MuJoCo {mujoco.__version__} finds no room for {document.name}: {said}"
             log.fail("MJC404", document.name, message, hint="close other programs, or make the scene smaller")
         _refuse(said, document, assembly, log)

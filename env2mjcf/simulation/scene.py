@@ -26,7 +26,6 @@ from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
 from ..model.environment import Environment, Task
 from ..options import Engine
-from ..pairs import Pair
 from ..pipeline import Compiled
 from ..report import Report, report
 from ..system.locks import Lock
@@ -167,8 +166,8 @@ class Scene:
     def spec(self) -> mujoco.MjSpec:
         """Return the scene as a new MjSpec, to be attached to another one.
 
-        An attached spec takes the options of its parent: give that `filterparent="disable"` and this scene's time step
-        where they matter.
+        An attached spec takes the options of its parent: give that `filterparent="disable"`, this scene's time step and
+        its `memory` where they matter.
         """
         return load_spec(self._compiled.document)
 
@@ -380,15 +379,15 @@ class Scene:
         """
         return self._solver.contacts(self.space.check_row(q), _known(engine))
 
-    def touching_pairs(self, q: ArrayLike) -> list[Pair]:
-        """Return the pairs of bodies that touch at one configuration, (dim,), as MuJoCo's engine says.
+    def touching_pairs(self, q: ArrayLike) -> tuple[tuple[str, str], ...]:
+        """Return those of `pairs` that touch at one configuration, (dim,), in their order, as MuJoCo's engine says.
 
         For non-convex bodies much quicker than `contacts`, which say where, and how deep.
 
         Raises:
             ValueError: q is not one configuration.
         """
-        return self._solver.touching_pairs(self.space.check_row(q))
+        return tuple((p.link, p.other) for p in self._solver.touching_pairs(self.space.check_row(q)))
 
     def contacts_of_poses(self, poses: ArrayLike) -> list[Contact]:
         """Return the contacts of links placed by hand, whether or not any configuration puts them there.
