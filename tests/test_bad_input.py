@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 from scenes import box_mesh, free_cube, without_privileges, write_scene
 
 import env2mjcf
+from env2mjcf import batch
 
 GOOD = free_cube("5 0 0 0 0 0")
 ARM = """Boundary Box [-9:9 ; -9:9 ; -9:9]
@@ -167,3 +170,47 @@ def test_a_file_that_may_not_be_read_is_named(tmp_path: Path, name: str, code: s
     answer = without_privileges(tmp_path, lambda: env2mjcf.load(path))
     assert answer.startswith(code)
     assert str(tmp_path / name) in answer
+
+
+@pytest.mark.parametrize("what", ["scene", "robot", "query", "mesh", "path", "rows", "batch"])
+def test_a_missing_file_is_a_file_not_found_error_too(tmp_path: Path, what: str) -> None:
+    path, none = write_scene(tmp_path, GOOD), tmp_path / "none.any"
+    scene = env2mjcf.load(path)
+    calls: dict[str, Callable[[], object]] = {
+        "scene": lambda: env2mjcf.load(none),
+        "robot": lambda: env2mjcf.read(path, robots=[none]),
+        "query": lambda: env2mjcf.load(path, query=none),
+        "mesh": lambda: env2mjcf.load(write_scene(tmp_path, GOOD.replace("cube.g 5", "none.any.g 5"))),
+        "path": lambda: env2mjcf.read_path(scene, none),
+        "rows": lambda: env2mjcf.read_configurations(none.with_suffix(".npy"), scene),
+        "batch": lambda: batch.run(scene, none.with_suffix(".npy"), tmp_path / "out.npy"),
+    }
+    with pytest.raises(FileNotFoundError) as caught:
+        calls[what]()
+    error = caught.value
+    assert isinstance(error, env2mjcf.GeometryError if what == "mesh" else env2mjcf.FormatError)
+    assert error.code == ("GEO201" if what == "mesh" else "ENV101")
+    assert error.errno == errno.ENOENT
+    assert "none" in error.filename
+    # Texts of an OSError with a number and a name are others: ours tells the code, the place and the hint.
+    assert str(error) == str(error.diagnostic)
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), again.diagnostics, again.errno) == (
+        type(error), str(error), error.diagnostics, error.errno,
+    )  # fmt: skip
+
+
+def test_folders_and_forbidden_files_are_errors_of_python_too(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError) as caught:
+        env2mjcf.read(tmp_path)
+    assert isinstance(caught.value, env2mjcf.FormatError)
+    assert (caught.value.code, caught.value.errno) == ("ENV102", errno.EISDIR)
+    path = write_scene(tmp_path, GOOD)
+    path.chmod(0)
+
+    def read() -> None:
+        with pytest.raises(PermissionError) as caught:
+            env2mjcf.read(path)
+        raise caught.value
+
+    assert without_privileges(tmp_path, read).startswith("ENV103")

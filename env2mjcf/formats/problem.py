@@ -305,8 +305,9 @@ def _flag(node: Node, name: str) -> bool | None:
 
 def _read_older_boundary(environment: Node) -> Boundary | None:
     """Read `<boundary type="bbox">` with a `<parameter>` an axis, which dialects A and B rely on."""
-    if environment.get("filename") or environment.get("input_env"):
-        environment.ignore_other_children("boundary")
+    if not (environment.get("filename") or environment.get("input_env")):
+        return None  # the environment stands inside, with its boundary
+    environment.ignore_other_children("boundary")
     for boundary in environment.children("boundary"):
         boundary.ignore_other_attributes("type")
         boundary.ignore_other_children("parameter")

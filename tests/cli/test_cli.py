@@ -174,6 +174,13 @@ class TestConvert:
         assert Path(result.out.strip()) == Path(where)
         assert (folder / where).is_file()
 
+    def test_names_its_output_after_the_problem(self, folder, run):
+        Path("the-task.xml").write_text('<Problem><Environment filename="a.env"/></Problem>')
+        result = run("convert", "the-task.xml")
+        assert Path(result.out.strip()) == Path("the-task_mjcf/the-task.xml")
+        assert mujoco.MjModel.from_xml_path(result.out.strip()).njnt == 2
+        assert Path(run("convert", "the-task.xml", "-o", "x/named.xml").out.strip()) == Path("x/named.xml")
+
     def test_refuses_two_places(self, folder, run):
         result = run("convert", "a.env", "x", "-o", "y")
         assert (result.status, result.out) == (2, "")

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 
+import numpy as np
 import pytest
+from scenes import write_scene
 from texts import LEGACY, LEGACY_FIXED, Reader, codes, fault, place, warnings
 
+import env2mjcf
 from env2mjcf.kinematics.forward import RobotKinematics
 from env2mjcf.limits import Limits
 from env2mjcf.model.environment import BaseKind, DHForm, Dialect, JointType, MultiBodyKind, Recentring
@@ -103,7 +107,26 @@ def test_a_pose_of_a_later_free_body_is_kept_and_reported(read: Reader) -> None:
     pose = scene.robots[0].bodies[1].pose
     assert pose is not None
     assert pose.position == (7, 8, 9)
-    assert "ENV301" in [d.code for d in scene.diagnostics]
+    assert [d.message for d in scene.diagnostics if d.code == "ENV301"] == [
+        "a connection places FreeBody 1 (link1.g); its own pose is not used"
+    ]
+
+
+@pytest.mark.parametrize(("pose", "place"), [("", "the origin"), (" 5 0 0 0 0 90", "its own pose")])
+def test_a_second_free_body_that_nothing_leads_to_is_told_of_once(tmp_path: Path, pose: str, place: str) -> None:
+    text = f"1\nMultiBody Active\n2\nFreeBody 0 cube.g 0 0 0 0 0 0\nFreeBody 1 cube.g{pose}\nConnection\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, text))
+    told = [d.message for d in scene.diagnostics if d.code in ("ENV301", "KIN302")]
+    assert told == [f"no connection leads to FreeBody 1 (cube.g): it is a base of its own, at home at {place}"]
+    assert scene.space.home[6:].tolist() == ([5, 0, 0, 0, 0, np.pi / 2] if pose else [0] * 6)
+
+
+def test_obstacles_of_free_bodies_are_told_of_once_and_stand_at_their_poses(tmp_path: Path) -> None:
+    obstacle = "MultiBody Passive\n2\nFreeBody 0 cube.g 1 0 9 0 0 0\nFreeBody 1 cube.g 4 5 6 0 0 0\nConnection\n0\n"
+    robot = "MultiBody Active\n1\nFreeBody 0 cube.g 0 0 0 0 0 0\nConnection\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, f"2\n{robot}{obstacle}"))
+    assert [d.code for d in scene.diagnostics if d.code in ("ENV301", "KIN302")] == ["KIN302"]
+    assert scene.obstacle_poses()[:, :3, 3].tolist() == [[1, 0, 9], [4, 5, 6]]
 
 
 def test_a_fixed_body_needs_its_pose(read: Reader) -> None:

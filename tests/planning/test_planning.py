@@ -26,6 +26,7 @@ from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
 from env2mjcf.planning import planner_space as validity
 from env2mjcf.planning.ompl_bridge import state_space
 from env2mjcf.planning.planner_space import PlanningSpace, Validity
+from env2mjcf.planning.planners import checked_planner
 from env2mjcf.planning.result import Progress
 from env2mjcf.planning.segment import shortened
 
@@ -360,6 +361,88 @@ def test_what_cannot_be_planned_is_said(arguments: dict[str, Any], message: str,
     given = {"start": [-2, 0, 0], "goal": [2, 0, 0], **arguments}
     with pytest.raises(ValueError, match=message):
         plan(scene, given.pop("start"), given.pop("goal"), **given)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("RRTC", "RRTConnect"), ("rrt-connect", "RRTConnect"), ("RRT*", "RRTstar"), ("prm*", "PRMstar"),
+        ("PRM_star", "PRMstar"), ("EST", "BatchEST"), ("connect", "RRTConnect"), ("BKP", "BKPIECE"), ("fmtt", "FMT"),
+    ],
+)  # fmt: skip
+def test_short_forms_of_planners_are_known(name: str, meant: str):
+    with pytest.raises(ValueError, match=re.escape(f"there is no planner {name!r}; did you mean {meant!r}?")):
+        checked_planner(name)
+
+
+# Groups.
+
+SWAP = """<MotionPlanning><Problem><Environment filename="group.env"/>
+{robots}<RobotGroup label="pair" robotLabels="a b"/>
+<GroupTask label="swap" group="pair">
+  <Task robot="b"><StartConstraints><CSpaceConstraint point="2 0"/></StartConstraints>
+    <GoalConstraints><CSpaceConstraint point="-2 0"/></GoalConstraints></Task>
+  <Task robot="a"><StartConstraints><CSpaceConstraint point="-2 0"/></StartConstraints>
+    <GoalConstraints><CSpaceConstraint point="2 0"/></GoalConstraints></Task>
+</GroupTask>
+<Task label="aside" robot="c"><StartConstraints><CSpaceConstraint point="0 3"/></StartConstraints>
+  <GoalConstraints><CSpaceConstraint point="3 3"/></GoalConstraints></Task>
+</Problem></MotionPlanning>"""
+
+
+@pytest.fixture
+def swap(tmp_path: Path) -> Path:
+    """Two cubes that change places, which neither can alone; a third has a task of its own."""
+    (tmp_path / "cube.g").write_text(CUBE)
+    (tmp_path / "cube.robot").write_text("1\ncube.g Planar Translational\nConnections\n0\n")
+    (tmp_path / "group.env").write_text("Boundary Box2D [-5:5 ; -5:5]\nMultibodies\n1\nPassive\ncube.g 0 0 4 0 0 0\n")
+    robots = "".join(f'<Robot label="{name}" filename="cube.robot"/>\n' for name in "abc")
+    (tmp_path / "swap.xml").write_text(SWAP.format(robots=robots))
+    return tmp_path / "swap.xml"
+
+
+def assert_boxes_apart(path: np.ndarray) -> None:
+    """Unit cubes that are not turned touch where they overlap along both axes; looked at much closer than they move."""
+    dense = np.concatenate([np.linspace(a, b, 400) for a, b in pairwise(path)])
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        between = np.abs(dense[:, 2 * i : 2 * i + 2] - dense[:, 2 * j : 2 * j + 2])
+        assert (between.max(axis=1) > 1).all()
+
+
+def test_robots_of_a_query_are_planned_for_together(swap: Path):
+    scene = env2mjcf.load(swap)
+    query = scene.queries[0]
+    assert query.robots == (1, 0)
+    found = plan(scene, query.q[0], query.q[-1], robot=query.robots, time=20)
+    assert_leads(scene, found, query.q[0], query.q[-1])
+    assert found.path[0].tolist() == [-2, 0, 2, 0, 0, 3]
+    assert found.path[-1].tolist() == [2, 0, -2, 0, 0, 3]
+    assert (found.path[:, 4:] == [0, 3]).all()
+    assert_boxes_apart(found.path)
+    # The other one stays in the way of one that goes alone.
+    with pytest.raises(ValueError, match="the goal is not valid"):
+        plan(scene, query.q[0], query.q[-1], robot=0)
+    for wrong in ((), (0, 3), (-1,)):
+        with pytest.raises(ValueError, match=r"there is no robot|robot is -1"):
+            plan(scene, query.q[0], query.q[-1], robot=wrong)
+
+
+@pytest.mark.parametrize("task", [1, 2])
+def test_a_path_of_several_robots_is_checked_as_it_was_planned(
+    swap: Path, task: int, capsys: pytest.CaptureFixture[str]
+):
+    out = swap.with_name("swap.path")
+    assert main(["plan", str(swap), "--task", str(task), "-o", str(out), "--time", "20"]) == 0
+    scene = env2mjcf.load(swap)
+    read = env2mjcf.read_path(scene, out)
+    query = scene.queries[task - 1]
+    assert set(read.robots.tolist()) == {-1}
+    assert np.array_equal(read.q[0], query.q[0])
+    assert np.array_equal(read.q[-1], query.q[-1])
+    assert_boxes_apart(read.q)
+    capsys.readouterr()
+    assert main(["check", str(swap), str(out)]) == 0
+    assert "invalid" not in capsys.readouterr().out
 
 
 # The verb.

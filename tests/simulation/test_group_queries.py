@@ -90,7 +90,8 @@ def test_random_groups_start_together(number: int, tmp_path: Path) -> None:
         # The truth is told of the poses of the text.
         fixed = np.broadcast_to(scene.obstacle_poses(), (len(rows), len(scene.obstacle_names), 4, 4))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(truth, "poses", lambda _: np.concatenate([poses, fixed], axis=1))
+            both = np.concatenate([poses, fixed], axis=1)
+            patch.setattr(truth, "poses", lambda _, both=both: both)
             _, touching = truth.verdicts(query.q)
         for engine in ("mujoco", "exact"):
             assert scene.in_collision(query.q, engine=engine).tolist() == touching.tolist()

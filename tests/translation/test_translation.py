@@ -432,9 +432,51 @@ def test_the_program_says_what_is_refused_and_what_is_wrong(tmp_path: Path, caps
     assert main(["translate", path, "-o", out, "--dialect", "B", "--strict"]) == 3
     assert main(["translate", path, "-o", str(tmp_path / "new"), "--dialect", "D"]) == 2
     assert main(["translate", path, "-o", out, "--dialect", "D", "--box", "1", "0", "0", "1", "0", "1"]) == 2
-    assert main(["translate", path, "-o", str(tmp_path / "no" / "new.env"), "--dialect", "D"]) == 3
+    assert main(["translate", path, "-o", str(tmp_path / "scene.env" / "new.env"), "--dialect", "D"]) == 3
     assert "ENV179" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["scene.env"]
+
+
+def test_the_program_makes_the_folder_or_leaves_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seed, made = MODELS / "seed/seed.env", tmp_path / "new" / "er" / "a.env"
+    assert main(["translate", str(seed), "-o", str(made), "--dialect", "A"]) == 0
+    assert np.array_equal(env2mjcf.load(made, allow_outside=True).space.home, env2mjcf.load(seed).space.home)
+    text = seed.read_text().replace("cube.g", "odd.g")
+    path = write(tmp_path / "new", text, "scene.env")
+    (tmp_path / "a folder").mkdir()
+    (tmp_path / "a folder" / "odd.g").write_text((seed.parent / "cube.g").read_text())
+    capsys.readouterr()
+    # A mesh that cannot be named from there, which comes out after the folder is made.
+    words = ["translate", str(path), "-o", str(tmp_path / "x" / "y" / "a.env"), "--dialect", "A"]
+    assert main([*words, "--mesh-dirs", str(tmp_path / "a folder")]) == 3
+    assert "ENV178" in capsys.readouterr().err
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a folder", "new"]
+
+
+def test_what_moves_together_is_lost_in_text_and_told(tmp_path: Path) -> None:
+    write(tmp_path, "1\nb.g Planar Translational\nConnections\n0\n", "a.robot")
+    write(tmp_path, E, "scene.env")
+    tasks = "".join(
+        f"""<Task robot="{name}"><StartConstraints><CSpaceConstraint point="{x} 0"/></StartConstraints>
+        <GoalConstraints><CSpaceConstraint point="{x} 9"/></GoalConstraints></Task>"""
+        for name, x in (("a", 1), ("b", 2))
+    )
+    problem = f"""<Problem><Environment filename="scene.env"/>
+    <Robot label="a" filename="a.robot"/><Robot label="b" filename="a.robot"/>
+    <RobotGroup label="g" robotLabels="a b"/><GroupTask label="t" group="g">{tasks}</GroupTask></Problem>"""
+    scene = env2mjcf.read(write(tmp_path, problem, "problem.xml"))
+    assert scene.tasks[0].robots == (0, 1)
+    result = translate(scene, "D")
+    assert "query files do not say that robots 0, 1 move together" in str(result.notes)
+    expected = [((0,), ((1, 0), (1, 9))), ((1,), ((2, 0), (2, 9)))]
+    assert [(t.robots, t.configurations) for t in result.environment.tasks] == expected
+    written = write_environment(result.environment, tmp_path / "out" / "d.env")
+    again = env2mjcf.read(written.environment, query=written.query)
+    assert [(t.robots, t.configurations) for t in again.tasks] == expected
+    # Written in its own dialect, without `translate`, too.
+    own = write_environment(scene, tmp_path / "own" / "e.env")
+    again = env2mjcf.read(own.environment, robots=own.robots, query=own.query)
+    assert [(t.robots, t.configurations) for t in again.tasks] == expected
 
 
 def test_joint_types_are_those_of_the_file(read: Reader) -> None:
