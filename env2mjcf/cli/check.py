@@ -153,7 +153,7 @@ class Check:
         if edges is not None:
             yield from self._listed("edge", edges.valid, partial(edge, edges))
         if any_rough(scene, told):
-            yield Text("depths at bodies that are not convex are rough: such meshes collide as thin plates", "dim")
+            yield Text("depths at bodies that are not convex may be more than the shortest way out", "dim")
         if graph is not None and graph.poses is not None:
             yield _pose_summary(graph.poses)
         yield _node_summary(nodes, "node" if graph and graph.kind == "roadmap" else "configuration")

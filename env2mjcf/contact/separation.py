@@ -18,8 +18,10 @@ from .surfaces import Surface, Surfaces, unit, unit_normals
 # each next one is this many times as long.
 _FIRST_WINDOW, _NARROWEST, _WIDER = 0.1, 0.01, 4.0
 # How many pairs of touching triangles are looked at, in how many directions they are taken apart, how many of the
-# pushes that take all of them apart are tried, and how many others.
-_TOUCHING, _WAYS, _PUSHES, _OTHERS = 512, 10, 6, 8
+# pushes of each kind that take all of them apart are tried, how many others, and of how many normals; and how often.
+_TOUCHING, _WAYS, _PUSHES, _OTHERS, _LEFT_SOON, _AGAIN = 512, 8, 2, 8, 4, 3
+# Off planes of either, of b alone, of a alone, off planes or square to edges: columns of ways to take triangles apart.
+_KINDS = (slice(0, 4), slice(0, 2), slice(2, 4), slice(0, 6))
 _DIGITS = 9
 _BLOCK = 4096
 
@@ -43,12 +45,12 @@ def separations(surfaces: Surfaces, jobs: Jobs, touch: float) -> tuple[Floats, F
     pairs it is the shortest one.
 
     Others are pushed until no triangles cross and none is inside the other. First come the shortest pushes that take
-    each pair of touching triangles apart, off the plane of one of them or square to an edge of each: one or two or
-    three of these planes decide. Where bodies touch at no more than ten planes and cross nothing else on the way, as in
-    shallow contact with flat walls, in a corner or in a notch, that is the shortest one, too. After that come
-    directions that would part their hulls soonest: of normals of triangles that touch, of lines square to two of
-    these, along which a tunnel leads out, of 26 even directions, and the line between the middles. So a deep overlap
-    of bodies that are not convex may be called deeper than it is.
+    each pair of touching triangles apart, off the plane of one of them or square to an edge of each: one, two or three
+    of these planes decide. What is met then is added, a few times. Where a body is pressed a little into flat walls, a
+    corner or a notch, by eight planes at the most, that is the shortest push there is. After that come directions that
+    would part their hulls soonest: of normals of triangles that touch, of lines square to two of these, along which a
+    tunnel leads out, of 26 even directions, and the line between the middles. So a deep overlap of bodies that are not
+    convex may be called deeper than it is.
 
     Args:
         surfaces: Of all bodies.
@@ -71,13 +73,10 @@ def separations(surfaces: Surfaces, jobs: Jobs, touch: float) -> tuple[Floats, F
         hits = touching_triangles(surfaces, alone, touch)
         window[k] = _FIRST_WINDOW * min(sizes[jobs.a[k]], sizes[jobs.b[k]])
         if len(hits):
-            pairs = hits[np.linspace(0, len(hits) - 1, min(len(hits), _TOUCHING)).astype(np.int64)]
-            ways, needed = _ways_apart(*pair_triangles(surfaces, alone, pairs), a, b)
-            pushes, normals = _pushes(ways, needed, touch)
+            pushes, lengths, normals = _pushes_of(surfaces, alone, hits, touch)
             square = unit(np.cross(normals[:, None], normals[None])[np.triu_indices(len(normals), 1)])
             directions = np.concatenate([directions, normals, -normals, square, -square])
-            lengths = np.linalg.norm(pushes, axis=1)
-            first.append(_Trials(np.full(len(pushes), k), unit(pushes), np.zeros(len(pushes))))
+            first.append(_Trials(np.full(len(pushes), k), pushes, np.zeros(len(pushes))))
             window[k] = np.clip(2 * lengths.min(initial=window[k]), _NARROWEST * window[k], window[k])
         else:
             points = nearest_points(surfaces, alone, touch)
@@ -187,36 +186,75 @@ def _edges(triangles: Floats) -> Floats:
     return np.roll(triangles, -1, axis=1) - triangles
 
 
-def _pushes(directions: Floats, ways: Floats, touch: float) -> tuple[Floats, Floats]:
-    """Return the shortest pushes, (p, 3), that take each pair of triangles apart in one of its ways, (t, 6), or nearly.
+def _pushes_of(surfaces: Surfaces, job: Jobs, hits: Ints, touch: float) -> tuple[Floats, Floats, Floats]:
+    """Return what `_pushes` does of one job and its touching triangles, and of those that are met after the best push.
 
-    Also returns the normals of planes, (n, 3), that touching triangles leave soonest.
+    What is still to be done there is added to what was to be done before, a few times.
     """
-    found, needed = list[Floats](), list[Floats]()
-    rows = np.arange(len(ways))
-    for columns in (slice(0, 4), slice(0, 6)):
-        best = np.argmin(ways[:, columns], axis=1)
-        chosen, way = directions[rows, best], ways[rows, best]
-        chosen, way = chosen[np.isfinite(way)], way[np.isfinite(way)]
-        once, which = np.unique(np.round(chosen, _DIGITS), axis=0, return_inverse=True)
-        most = np.full(len(once), touch)
-        np.maximum.at(most, which.ravel(), way)
-        order = np.argsort(-most, kind="stable")[:_WAYS]
-        # The direction itself, not rounded.
-        found.append(chosen[[int(np.argmax(which.ravel() == i)) for i in order]].reshape(-1, 3))
-        needed.append(most[order])
-    tried = [f * n[:, None] for f, n in zip(found, needed, strict=True)]
-    tried += [_meeting(f, n, many) for f, n in zip(found, needed, strict=True) for many in (2, 3)]
-    pushes = np.concatenate(tried)
-    lengths = np.linalg.norm(pushes, axis=1)
+    a, b = surfaces.surface(int(job.a[0])), surfaces.surface(int(job.b[0]))
+    at, here, found = np.zeros(3), job, list[tuple[Floats, Floats, Floats]]()
+    directions, ways = np.zeros((0, 6, 3)), np.zeros((0, 6))
+    for _ in range(_AGAIN):
+        pairs = hits[np.linspace(0, len(hits) - 1, min(len(hits), _TOUCHING)).astype(np.int64)]
+        more, needed = _ways_apart(*pair_triangles(surfaces, here, pairs), a, b)
+        # What merely touches must not be pushed against, either.
+        needed = np.maximum(needed, touch) + more @ at
+        directions, ways = np.concatenate([directions, more]), np.concatenate([ways, needed])
+        pushes, lengths, normals = _pushes(directions, ways, touch)
+        found.append((pushes, lengths, normals))
+        if not len(pushes):
+            break
+        best = int(np.argmin(lengths))
+        at = pushes[best] * (lengths[best] * (1 + 1e-9) + 10 * touch)
+        here = _moved(job, np.zeros(1, dtype=np.int64), at[None])
+        hits = touching_triangles(surfaces, here, touch)
+        if not len(hits):
+            break
+    # What looked best at first may still be what is shortest.
+    kept = found[:: max(1, len(found) - 1)]
+    return np.concatenate([f[0] for f in kept]), np.concatenate([f[1] for f in kept]), found[0][2]
+
+
+def _pushes(directions: Floats, ways: Floats, touch: float) -> tuple[Floats, Floats, Floats]:
+    """Return the shortest pushes that take each pair of triangles apart in one of its ways, (t, 6), or nearly.
+
+    As unit vectors, (p, 3), and how far, (p,), at a guess where some would not come apart. Also returns normals of
+    planes, (n, 3), that must be left, the last ones of those that are left soonest.
+    """
+    found, pushes, kind = list[Floats](), list[Floats](), list[Ints]()
+    for columns in _KINDS:
+        normals, needed = _planes(directions[:, columns], ways[:, columns], touch)
+        tried = [normals * needed[:, None], *(_meeting(normals, needed, many) for many in (2, 3))]
+        kind.append(np.full(sum(map(len, tried)), len(found)))
+        found.append(normals)
+        pushes += tried
+    tried, of = np.concatenate(pushes), np.concatenate(kind)
     # What a push leaves to be done, where triangles are still not apart.
-    left = np.zeros(len(pushes))
+    left = np.zeros(len(tried))
     for i in range(0, len(ways), 256):
-        short = ways[i : i + 256, :, None] - directions[i : i + 256] @ pushes.T
+        short = ways[i : i + 256, :, None] - directions[i : i + 256] @ tried.T
         left = np.maximum(left, short.min(axis=1).max(axis=0))
-    order = np.argsort(lengths + 2 * left, kind="stable")
-    once = np.unique(np.round(unit(pushes[order]), _DIGITS), axis=0, return_index=True)[1]
-    return pushes[order[np.sort(once)[:_PUSHES]]], found[0][-4:]
+    lengths = np.linalg.norm(tried, axis=1) + 2 * left
+    order = np.argsort(lengths, kind="stable")
+    order = order[np.sort(np.unique(np.round(unit(tried[order]), _DIGITS), axis=0, return_index=True)[1])]
+    # Of each kind some: the best may not be what looks best.
+    chosen = np.unique(np.concatenate([np.flatnonzero(of[order] == k)[:_PUSHES] for k in range(len(_KINDS))]))
+    return unit(tried[order[chosen]]), lengths[order[chosen]], found[0][-_LEFT_SOON:]
+
+
+def _planes(directions: Floats, ways: Floats, touch: float) -> tuple[Floats, Floats]:
+    """Return in which directions triangles come apart soonest, (n, 3), and how far, (n,), the farthest first.
+
+    Each direction is as far as the pairs want that have no shorter way.
+    """
+    best = np.argmin(ways, axis=1)
+    rows = np.flatnonzero(np.isfinite(ways.min(axis=1)))
+    chosen, way = directions[rows, best[rows]], ways[rows, best[rows]]
+    _, first, which = np.unique(np.round(chosen, _DIGITS), axis=0, return_index=True, return_inverse=True)
+    most = np.full(len(first), touch)
+    np.maximum.at(most, which.ravel(), way)
+    order = np.argsort(-most, kind="stable")[:_WAYS]
+    return chosen[first[order]], most[order]
 
 
 def _meeting(normals: Floats, ways: Floats, many: int) -> Floats:

@@ -28,9 +28,9 @@ class Contact:
         kind: Whether `other` is an obstacle, a link of the same robot, or of another one.
         position: (3,) where, world frame, metres.
         normal: (3,) unit vector from `link` towards `other`.
-        distance: Metres; negative in depth. Between hulls, MuJoCo's penetration. Where surfaces cross, how far the
-            link's triangle must go back along the normal to be beside the other's: with small triangles less than the
-            bodies are in each other. For a body wholly inside another, the way out.
+        distance: Metres; negative in depth. Of the deepest contact of a pair, how far the link must go back along the
+            normal to be clear of the other, as `clearance` says. Others are less deep or as deep; of bodies that are
+            not convex, they say how far the link's triangle must go back to be beside the other's.
     """
 
     link: str

@@ -354,8 +354,8 @@ class Scene:
         Free: the distance of the triangles, exact but for rounding; +inf without pairs.
         In collision: zero or less, minus the depth of the deepest pair. The depth is the length of the shortest push,
         of those tried, that takes one body clear of the other: it really separates them, so it never falls short of
-        the shortest translation that does. For two convex bodies of few faces it is that translation (for many faces,
-        not always). It fades to zero as bodies come free.
+        the shortest translation that does. For two convex bodies it is that translation, and for others that are
+        pressed a little into flat walls or corners. It fades to zero as bodies come free.
 
         What collides is what is measured: with `collision="hull"` (and "coacd") the hulls instead of the triangles,
         with "surface" the triangles alone (a body wholly inside another has a distance from it), else also the inside
@@ -371,8 +371,9 @@ class Scene:
     def contacts(self, q: ArrayLike, *, engine: Engine | None = None) -> list[Contact]:
         """Return the contacts of one configuration, (dim,): a few for each pair that touches, the deepest first.
 
-        There are some exactly where `in_collision` is True. Pairs that cannot move are included. Places, normals and
-        depths come from MuJoCo and from triangles, whichever engine says that there are any.
+        There are some exactly where `in_collision` is True. Pairs that cannot move are included. The deepest of a pair
+        is as deep as the pair, by `clearance`'s measure: moved back along its normal by its depth, the link is clear of
+        the other. Places, normals and depths do not depend on which engine says that there are any.
 
         Raises:
             ValueError: As for `explain`.

@@ -24,7 +24,7 @@ __all__ = ["assert_free", "assert_valid", "assert_valid_path"]
 PICTURES_VARIABLE = "ENV2MJCF_PICTURES"
 """Environment variable that names a folder for pictures of failures; pytest's --env2mjcf-pictures sets it."""
 
-_ROUGH = "(depths at bodies that are not convex are rough: such meshes collide as thin plates)"
+_ROUGH = "(depths at bodies that are not convex may be more than the shortest way out)"
 # What is said where a verdict has no reasons.
 _UNSEEN = "something touches, within the tolerance of contact"
 # Reasons beyond these are counted, not listed.

@@ -86,7 +86,7 @@ def test_a_body_inside_another_is_pushed_out_by_the_short_way(tmp_path: Path) ->
     assert not scene.in_collision(out)
 
 
-def test_hulls_keep_the_penetration_that_mujoco_found(tmp_path: Path) -> None:
+def test_a_turned_cube_is_as_deep_as_its_corner(tmp_path: Path) -> None:
     scene = env2mjcf.load(write_scene(tmp_path, free_cube("5 0 0 0 0 0")))
     contacts = scene.contacts(np.array([4.3, 0, 0, 0, 0, 0.2]))
     reach = 0.5 * (np.cos(0.2) + np.sin(0.2))
@@ -108,6 +108,8 @@ def assert_sane(scene: env2mjcf.Scene, rows: np.ndarray) -> int:
             distances = [c.distance for c in contacts if (c.link, c.other) == pair]
             assert distances == sorted(distances)
             assert distances[0] <= 1e-5 * scene.extent
+        if min((c.distance for c in contacts), default=0.0) < -1e-5 * scene.extent:
+            assert min(c.distance for c in contacts) == pytest.approx(scene.clearance(q), abs=1e-9 * scene.extent)
         for c in contacts:
             assert np.linalg.norm(c.normal) == pytest.approx(1, abs=1e-9)
             assert np.isfinite(c.position).all()
