@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import did_you_mean
+from ..errors import did_you_mean, enumeration
 from ..model.environment import Boundary, BoundaryShape, PlannerRules
 from ..options import Options
 from .blocks import read_coordinate
@@ -110,7 +110,7 @@ def _read_robots(problem: Node) -> tuple[tuple[ProblemRobot, ...], set[str]]:
 
 
 def _read_tasks(problem: Node, robots: tuple[ProblemRobot, ...], virtual: set[str]) -> tuple[ProblemTask, ...]:
-    labels = [r.label for r in robots]
+    labels = {r.label: None for r in robots}
     tasks: list[ProblemTask] = []
     for node in problem.descendants("Task"):
         robot = node.get("robot") or ""
@@ -119,7 +119,7 @@ def _read_tasks(problem: Node, robots: tuple[ProblemRobot, ...], virtual: set[st
         elif robot in labels:
             tasks.append(_read_task(node, robot))
         else:
-            known = ", ".join(repr(label) for label in labels) or "none"
+            known = enumeration([repr(label) for label in labels]) or "none"
             message = f"task {node.get('label') or ''!r} is for the unknown robot {robot!r}; expected one of: {known}"
             node.fail("ENV149", message, hint=did_you_mean(robot, labels) or "name a robot of this file", at="robot")
     return tuple(tasks)

@@ -181,7 +181,8 @@ class Node:
         for name in others:
             message = f"attribute {name!r} of <{self.tag}> is not used"
             span = self.source.span(*places[name]) if name in places else self.span
-            self.log.info("ENV311", f"<{self.tag}>", message, hint=did_you_mean(name, known), span=span)
+            hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
+            self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
 
     def ignore(self, message: str) -> None:
         """Report that nothing reads this element."""

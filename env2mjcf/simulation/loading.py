@@ -8,6 +8,7 @@ from typing import Unpack
 from ..contact.exact.engine import require
 from ..contact.types import Contact, deepest
 from ..diagnostics import DiagnosticLog
+from ..errors import Span
 from ..model.environment import Dialect, Environment
 from ..options import OptionKeywords, Options, PathArgument
 from ..pipeline import Compiled, compile_scene, recompile
@@ -46,8 +47,9 @@ def prepare(source: PathArgument | Environment, options: Options, log: Diagnosti
         log.info("KIN313", scene.environment.name, f"not tested, because they touch at home: {names}")
         # The first compilation has reported everything else already.
         return _scene(recompile(compiled, [(c.link, c.other) for c in touching], DiagnosticLog()), log)
+    places = {p.name: p.body.span for p in compiled.assembly.parts()}
     for contact in touching:
-        _report_touching(compiled, contact, log)
+        _report_touching(compiled, contact, places[contact.link], log)
     return scene.with_diagnostics(tuple(log))
 
 
@@ -56,14 +58,13 @@ def _scene(compiled: Compiled, log: DiagnosticLog) -> Scene:
     return Scene(dataclasses.replace(compiled, diagnostics=tuple(log)), model)
 
 
-def _report_touching(compiled: Compiled, contact: Contact, log: DiagnosticLog) -> None:
+def _report_touching(compiled: Compiled, contact: Contact, span: Span | None, log: DiagnosticLog) -> None:
     link, other = contact.link, contact.other
-    body = next(p.body for p in compiled.assembly.parts() if p.name == link)
     if contact.kind == "obstacle" and compiled.environment.dialect is not Dialect.A:
         # Dialects B to E give no base pose, so that home is the origin, wherever obstacles are.
         message = f"{link} and {other} touch at home, where the base is at the origin"
         hint = "" if compiled.environment.tasks else "give a query: simulations can begin at its start"
-        log.info("KIN312", link, message, hint=hint, span=body.span)
+        log.info("KIN312", link, message, hint=hint, span=span)
         return
     hint = "exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch"
-    log.warn("KIN312", link, f"{link} and {other} touch at home", hint=hint, span=body.span)
+    log.warn("KIN312", link, f"{link} and {other} touch at home", hint=hint, span=span)
