@@ -6,7 +6,10 @@ MuJoCo, `CFG` configurations and queries.
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict, replace
 from typing import NoReturn
 
 from .errors import (
@@ -298,10 +301,17 @@ def error_class(code: str) -> type[Env2MjcfError]:
     return ConversionError if code in _NOT_EXPRESSED | _NOT_WRITTEN else _CLASSES[code[:3]]
 
 
+# Findings of one code that are kept, so that a file of nothing but faults takes little memory.
+_KEPT = 1000
+# Findings of one code that are shown, and bytes of JSON that all may take, about twice those of text.
+_SHOWN, _SHOWN_BYTES = 10, 20_000
+
+
 class DiagnosticLog:
     """Collects diagnostics; in strict mode the first warning is raised as an error.
 
-    A code tells the class of its error; `info`, `warn` and `fail` say how bad it is.
+    A code tells the class of its error; `info`, `warn` and `fail` say how bad it is. Of each code the first thousand
+    are kept; one diagnostic more then stands for all others, and says how many they are.
 
     Args:
         strict: Whether warnings are errors.
@@ -310,27 +320,87 @@ class DiagnosticLog:
     def __init__(self, strict: bool = False) -> None:
         self.strict = strict
         self._items: list[Diagnostic] = []
+        self._counts: Counter[tuple[str, Severity]] = Counter()
+        # The first that is not kept, of each code.
+        self._others: dict[tuple[str, Severity], Diagnostic] = {}
 
     def __iter__(self) -> Iterator[Diagnostic]:
-        return iter(self._items)
+        yield from self._items
+        kept = Counter((d.code, d.severity) for d in self._items) if self._others else {}
+        for key, first in self._others.items():
+            yield _standing_for(first, self._counts[key] - kept[key], self._counts[key])
 
     def __len__(self) -> int:
-        return len(self._items)
+        return len(self._items) + len(self._others)
+
+    def keeps(self, code: str, severity: Severity) -> bool:
+        """Whether one more finding of a code would be kept, so that a hint for it is worth looking for."""
+        return self._counts[code, severity] < _KEPT
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
         """Add findings that an earlier stage has already judged."""
-        self._items.extend(diagnostics)
+        for diagnostic in diagnostics:
+            self._add(diagnostic, diagnostic.times == 1 and self.keeps(diagnostic.code, diagnostic.severity))
 
     def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
         """Record something worth knowing that is not a fault."""
-        self._items.append(Diagnostic(code, Severity.INFO, subject, message, hint, span))
+        self._record(code, Severity.INFO, subject, message, hint, span)
 
     def warn(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
         """Record something doubtful; raise it in strict mode."""
         if self.strict:
             self.fail(code, subject, message, hint=hint, span=span)
-        self._items.append(Diagnostic(code, Severity.WARNING, subject, message, hint, span))
+        self._record(code, Severity.WARNING, subject, message, hint, span)
 
     def fail(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> NoReturn:
         """Raise a fault, with everything recorded before it."""
-        raise error_class(code)(Diagnostic(code, Severity.ERROR, subject, message, hint, span), self._items)
+        raise error_class(code)(Diagnostic(code, Severity.ERROR, subject, message, hint, span), self)
+
+    def _record(self, code: str, severity: Severity, subject: str, message: str, hint: str, span: Span | None) -> None:
+        key = code, severity
+        if key in self._others:
+            self._counts[key] += 1
+        else:
+            self._add(Diagnostic(code, severity, subject, message, hint, span), self.keeps(code, severity))
+
+    def _add(self, diagnostic: Diagnostic, kept: bool) -> None:
+        key = diagnostic.code, diagnostic.severity
+        self._counts[key] += diagnostic.times
+        if kept:
+            self._items.append(diagnostic)
+        else:
+            self._others.setdefault(key, diagnostic)
+
+
+def few(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return a few findings of each code, and one more that stands for its others: what people read, a page or two.
+
+    An error that ends the list, as in `Env2MjcfError.diagnostics`, is always among them.
+    """
+    listed = list(diagnostics)
+    end = [listed.pop()] if listed and listed[-1].severity is Severity.ERROR else []
+    log, left = DiagnosticLog(), _SHOWN_BYTES - sum(map(_size, end))
+    for diagnostic in listed:
+        shown = diagnostic.times == 1 and left > 0 and log._counts[diagnostic.code, diagnostic.severity] < _SHOWN
+        if shown:
+            left -= _size(diagnostic)
+        log._add(diagnostic, shown)
+    return (*log, *end)
+
+
+def totals(diagnostics: Iterable[Diagnostic]) -> dict[str, int]:
+    """Return how often each code was found, the most frequent first."""
+    counts: Counter[str] = Counter()
+    for diagnostic in diagnostics:
+        counts[diagnostic.code] += diagnostic.times
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _size(diagnostic: Diagnostic) -> int:
+    return len(json.dumps(asdict(diagnostic)))
+
+
+def _standing_for(first: Diagnostic, times: int, total: int) -> Diagnostic:
+    span = first.span and replace(first.span, text="", skipped=0)
+    message = f"{times} more findings of this code are not listed; {total} in all"
+    return replace(first, message=message, hint="", span=span, times=times)

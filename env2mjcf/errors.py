@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import errno
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import islice
 
 
 class Severity(StrEnum):
@@ -61,6 +63,9 @@ class Diagnostic:
         message: What was found and what was expected.
         hint: What to do about it; may be empty.
         span: Where in the source, if it has a place.
+        times: How many findings it stands for: more than one in the last of a code that was found very often.
+
+    What files say is quoted in `subject`, `message` and `hint`: they are abridged, however long that is.
     """
 
     code: str
@@ -69,6 +74,13 @@ class Diagnostic:
     message: str
     hint: str = ""
     span: Span | None = None
+    times: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("subject", "message", "hint"):
+            text = getattr(self, name)
+            if len(text) > _LONGEST_WORD:
+                object.__setattr__(self, name, abridged(text))
 
     def __str__(self) -> str:
         place = f"{self.span}: " if self.span else ""
@@ -164,9 +176,44 @@ class ConversionError(Env2MjcfError):
     """A scene that cannot be expressed in, or is refused by, MuJoCo; or output that cannot be written."""
 
 
+# Characters of a word, and of a line, of a message at most; lines of a message at most.
+_LONGEST_WORD, _LONGEST_LINE, _MOST_LINES = 240, 1000, 25
+_LONG_WORD = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
+# Characters that are looked at, at either end, of a text however long.
+_LOOKED_AT = 1 << 15
+
+
+def abridged(text: str, lines: int = _MOST_LINES) -> str:
+    """Return a text for people without the middle of long words and lines, and of so many lines at most."""
+    if len(text) <= _LONGEST_WORD:
+        return text
+    if len(text) > 2 * _LOOKED_AT:
+        text = f"{text[:_LOOKED_AT]}...{text[-_LOOKED_AT:]}"
+    listed = _LONG_WORD.sub(lambda m: _without_middle(m[0], _LONGEST_WORD), text).split("\n")
+    if len(listed) > lines:
+        listed[lines - 1 :] = [f"... and {len(listed) - lines + 1} more lines"]
+    return "\n".join(_without_middle(line, _LONGEST_LINE) for line in listed)
+
+
+def _without_middle(text: str, most: int) -> str:
+    # What was expected stands behind what was found.
+    return text if len(text) <= most else f"{text[: most - most // 3]}...{text[3 - most // 3 :]}"
+
+
+def enumeration(names: Sequence[str], most: int = 12) -> str:
+    """Return the first of some names, with commas between them, and how many more there are."""
+    return ", ".join(names[:most]) + (f", and {len(names) - most} more" if len(names) > most else "")
+
+
+# Names that a word is compared with at most.
+_COMPARED = 1000
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return `did you mean 'x'?` for the nearest known word, else an empty string."""
-    by_folded = {k.lower(): k for k in known}
+    """Return `did you mean 'x'?` for the nearest known word, of very many one of the first, else an empty string."""
+    # Words that are alike enough are not twice as long as each other, or half as long.
+    alike = (k for k in known if 0.4 <= len(k) / (len(word) or 1) <= 2.5)
+    by_folded = {k.lower(): k for k in islice(alike, _COMPARED)}
     near = difflib.get_close_matches(word.lower(), by_folded, n=1, cutoff=0.6)
     return f"did you mean {by_folded[near[0]]!r}?" if near else ""
 

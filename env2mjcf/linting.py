@@ -74,7 +74,7 @@ class LintResult:
 
     def count(self, severity: Severity) -> int:
         """Return the number of findings of one severity."""
-        return sum(d.severity is severity for d in self.diagnostics)
+        return sum(d.times for d in self.diagnostics if d.severity is severity)
 
 
 def lint(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
 
-from .errors import did_you_mean
+from .errors import did_you_mean, enumeration
 from .kinematics.forward import RobotKinematics
 from .model.dialects import RULES
 from .model.environment import BaseKind, JointType, MultiBody, PlannerRules
@@ -66,7 +66,7 @@ def pair_table(robots: Sequence[Robot], obstacles: Sequence[str], options: Optio
     Raises:
         ValueError: `exclude_pairs` names an unknown body.
     """
-    names = [*(n for r in robots for n in r.links), *obstacles]
+    names = dict.fromkeys([*(n for r in robots for n in r.links), *obstacles])
     given = {frozenset(_known(p, names)) for p in options.exclude_pairs}
     self_collision = options.tests_self(rules.ignore_self_collision)
     tested: list[Pair] = []
@@ -138,12 +138,12 @@ def _within(multibody: MultiBody, steps: int) -> set[tuple[int, int]]:
     return near
 
 
-def _known(pair: tuple[str, str], names: Sequence[str]) -> tuple[str, str]:
+def _known(pair: tuple[str, str], names: Mapping[str, None]) -> tuple[str, str]:
     for name in pair:
         if name not in names:
             guess = did_you_mean(name, names)
             raise ValueError(
                 f"exclude_pairs names the unknown body {name!r}{f'; {guess}' if guess else ''} "
-                f"(bodies: {', '.join(names)})"
+                f"(bodies: {enumeration(list(names))})"
             )
     return pair

@@ -118,7 +118,8 @@ def _robots(environment: Environment, metres: float) -> list[RobotSummary]:
     in_metres = scaled(environment, metres)
     kinematics = [RobotKinematics.of(r) for r in in_metres.robots]
     names = body_names(environment)
-    links = [_names_of(environment, (r,), names) for r in environment.robots]
+    by_identity = {id(m): names[i] for i, m in enumerate(environment.multibodies)}
+    links = [by_identity[id(r)] for r in environment.robots]
     space = ConfigurationSpace(
         kinematics,
         [n for own, k in zip(links, kinematics, strict=True) for n in dof_names(own, k.dofs)],

@@ -25,7 +25,7 @@ class Output:
 
     Attributes:
         json: Print the result as JSON.
-        verbose: Show notes, too, not just warnings and errors.
+        verbose: Show notes, too, and all findings and rows instead of the first few of each kind.
         debug: Show a traceback when something fails.
     """
 

@@ -18,7 +18,7 @@ from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .meter import Meter
 from .program import DONE
-from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, remark
+from .terminal import listed, loaded, one_line, print_diagnostics, print_json, print_parts, remark
 
 if TYPE_CHECKING:
     from ..batch import BatchResult
@@ -75,7 +75,13 @@ class Batch:
                 file_units=self.file_units, threads=self.threads, executor=executor, advance=meter.at, say=remark,
             )  # fmt: skip
         if self.output.json:
-            print_json({**dataclasses.asdict(result), "rate": result.rate, "diagnostics": scene.diagnostics})
+            print_json(
+                {
+                    **dataclasses.asdict(result),
+                    "rate": result.rate,
+                    "diagnostics": listed(scene.diagnostics, self.output.verbose),
+                }
+            )
         else:
             print_parts([_summary(result)])
         return DONE

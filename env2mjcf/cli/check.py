@@ -17,12 +17,12 @@ from tqdm import tqdm
 from tyro.conf import Positional
 
 from ..diagnostics import DiagnosticLog
-from ..errors import ConversionError, counted, one_line
+from ..errors import ConversionError, abridged, counted, one_line
 from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE, FINDING
-from .terminal import loaded, plain, print_diagnostics, print_json, print_parts, working
+from .terminal import listed, loaded, plain, print_diagnostics, print_json, print_parts, reason_lines, working
 
 if TYPE_CHECKING:
     from ..companions.records import Configurations, Graph, Poses
@@ -97,7 +97,7 @@ class Check:
         valid = bool(nodes.valid.all()) and (edges is None or bool(edges.valid.all()))
         if self.output.json:
             found = {"valid": valid, "dofs": scene.space.names, **_as_json(nodes, graph, edges)}
-            print_json({**found, "diagnostics": tuple(log)})
+            print_json({**found, "diagnostics": listed(log, self.output.verbose)})
         else:
             print_parts(self._lines(scene, nodes, graph, edges))
         if self.picture is not None:
@@ -142,12 +142,12 @@ class Check:
         def node(i: int) -> Iterator[Text]:
             verdict = nodes.verdict(i)
             told.extend(verdict.reasons)
-            return _node_lines(nodes.labels[i], verdict)
+            return _node_lines(nodes.labels[i], verdict, self.all)
 
         def edge(edges: EdgeVerdicts, i: int) -> Iterator[Text]:
             verdict = edges.verdict(i)
             told.extend(verdict.at.reasons if verdict.at else ())
-            return _edge_lines(verdict)
+            return _edge_lines(verdict, self.all)
 
         yield from self._listed("configuration", nodes.valid, node)
         if edges is not None:
@@ -171,15 +171,14 @@ class Check:
             yield Text(f"... and {left} more that are invalid (--all lists every {what})", "dim")
 
 
-def _node_lines(label: str, verdict: Verdict) -> Iterator[Text]:
+def _node_lines(label: str, verdict: Verdict, every: bool) -> Iterator[Text]:
     yield _headed(label, verdict.summary)
-    for reason in verdict.reasons:
-        yield Text(f"    {one_line(str(reason))}")
+    yield from reason_lines(verdict.reasons, every)
 
 
-def _edge_lines(verdict: EdgeVerdict) -> Iterator[Text]:
+def _edge_lines(verdict: EdgeVerdict, every: bool) -> Iterator[Text]:
     if verdict.at is not None and verdict.fraction is not None:
-        head, *reasons = _node_lines(verdict.label, verdict.at)
+        head, *reasons = _node_lines(verdict.label, verdict.at, every)
         yield head.append(f" at {verdict.fraction:.4g} of the way", "bold red")
         yield from reasons
     elif not verdict.checked:
@@ -224,11 +223,11 @@ def _counts(valid: str, wrong: dict[str, int]) -> str:
 def _first_invalid(nodes: Verdicts, edges: EdgeVerdicts) -> Iterator[Text]:
     """Yield which configuration and which edge are the first that are invalid."""
     if not nodes.valid.all():
-        yield Text(f"first invalid: {one_line(nodes.labels[int(np.argmin(nodes.valid))])}")
+        yield Text(f"first invalid: {one_line(abridged(nodes.labels[int(np.argmin(nodes.valid))]))}")
     if not edges.valid.all():
         verdict = edges.verdict(int(np.argmin(edges.valid)))
         where = "" if verdict.fraction is None else f", at {verdict.fraction:.4g} of the way"
-        yield Text(f"first invalid: {one_line(verdict.label)}{where}")
+        yield Text(f"first invalid: {one_line(abridged(verdict.label))}{where}")
 
 
 def _as_json(nodes: Verdicts, graph: Graph | None, edges: EdgeVerdicts | None) -> dict[str, Any]:
@@ -270,7 +269,7 @@ def _edge_json(verdict: EdgeVerdict) -> dict[str, Any]:
 
 
 def _headed(label: str, wrong: str) -> Text:
-    return Text.assemble(f"{one_line(label)}: ", (wrong, "bold red") if wrong else ("valid", "bold green"))
+    return Text.assemble(f"{one_line(abridged(label))}: ", (wrong, "bold red") if wrong else ("valid", "bold green"))
 
 
 def _bar(count: int, unit: str) -> tqdm[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from ..errors import robots_named
+from ..errors import counted, robots_named
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
 from .terminal import one_line
@@ -20,11 +21,16 @@ if TYPE_CHECKING:
     from ..report import MeshReport, Report
     from ..simulation.verdicts import PairCount
 
+# Rows about degrees of freedom in all, what the head of a robot counts for among them, and rows about meshes.
+_ROWS, _ROBOT_ROWS, _MESHES = 80, 4, 30
+# Characters of a cell, and of a name.
+_LONGEST, _LONGEST_NAME = 400, 80
 _UNITS = {"turns": "turns", "pi": "pi rad", "length": "length"}
 
 
-def text_part(scene: SceneSummary) -> Iterator[RenderableType]:
-    """Yield what the text says."""
+def text_part(scene: SceneSummary, every: bool) -> Iterator[RenderableType]:
+    """Yield what the text says: of robots and queries the first, or every one."""
+    most = sys.maxsize if every else _ROWS
     yield Text(one_line(scene.path), "bold")
     rows = [
         ("dialect", f"{scene.dialect}: {scene.told_by}"),
@@ -39,24 +45,33 @@ def text_part(scene: SceneSummary) -> Iterator[RenderableType]:
         rows.append(("surfaces", f"{_list(scene.surfaces)} (drawn, never touched)"))
     rows += [
         ("query", f"{robots_named(q.robots)}: {q.configurations} configurations{f', {q.label}' if q.label else ''}")
-        for q in scene.queries
+        for q in scene.queries[:most]
     ]
+    rows += _left("query", len(scene.queries) - most)
     yield _facts(rows)
     for number, robot in enumerate(scene.robots):
-        yield from _robot(number, robot)
+        if most <= 0:
+            yield Text(f"\nand {counted(len(scene.robots) - number, 'more robot')} (--verbose lists all)", "dim")
+            return
+        yield from _robot(number, robot, most)
+        most -= len(robot.dofs) + _ROBOT_ROWS
 
 
-def geometry_part(report: Report) -> Iterator[RenderableType]:
-    """Yield what meshes add."""
+def geometry_part(report: Report, every: bool) -> Iterator[RenderableType]:
+    """Yield what meshes add: about the first of them, or about every one."""
+    meshes = report.meshes if every else report.meshes[:_MESHES]
     yield Text(f"\nMeshes, collision {report.collision}", "bold")
     table = _table("file", "triangles", "closed", "convex", "cells", "collides as", right=(1, 4))
-    for mesh in report.meshes:
-        table.add_row(*_cells(mesh.file, mesh.triangles, _closed(mesh), _yes(mesh.convex), mesh.cells, mesh.note))
+    for mesh in meshes:
+        name = _short(mesh.file, _LONGEST_NAME)
+        table.add_row(*_cells(name, mesh.triangles, _closed(mesh), _yes(mesh.convex), mesh.cells, mesh.note))
+    for row in _left("...", len(report.meshes) - len(meshes)):
+        table.add_row(*_cells(*row))
     yield _indented(table)
-    proofs = {m.file: m.certificate for m in report.meshes if m.certificate is not None}
+    proofs = {m.file: m.certificate for m in meshes if m.certificate is not None}
     if proofs:
         yield Text("\nHow far that is from the meshes", "bold")
-        yield _facts((file, str(proof)) for file, proof in proofs.items())
+        yield _facts((_short(file, _LONGEST_NAME), str(proof)) for file, proof in proofs.items())
     yield Text("\nWhole scene", "bold")
     yield _facts(
         [
@@ -93,17 +108,24 @@ def _touch(count: PairCount) -> str:
     return f"{count.verdict}, in {count.samples} samples"
 
 
-def _robot(number: int, robot: RobotSummary) -> Iterator[RenderableType]:
-    where = "".join(f", {one_line(x)}" for x in (robot.label, robot.file) if x)
+def _left(name: str, count: int) -> list[tuple[str, str]]:
+    """Return a row, if any, that tells how many more there are."""
+    return [(name, f"and {count} more (--verbose lists all)")] if count > 0 else []
+
+
+def _robot(number: int, robot: RobotSummary, most: int) -> Iterator[RenderableType]:
+    where = "".join(f", {one_line(_short(x))}" for x in (robot.label, robot.file) if x)
     yield Text(f"\nRobot {number}{where}", "bold")
     yield _facts([("base", robot.base), ("bodies", _list(robot.links)), ("freedom", f"{len(robot.dofs)} degrees")])
     if not robot.dofs:
         return
     table = _table("", "unit", "limits in file", "home", "limits in rad, m", "home", right=(3, 5))
-    for dof in robot.dofs:
+    for dof in robot.dofs[:most]:
         of_file = _limits(dof, dof.lower, dof.upper), f"{dof.home:.6g}"
         in_si = _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"
-        table.add_row(*_cells(dof.name, _UNITS[dof.unit], *of_file, *in_si))
+        table.add_row(*_cells(_short(dof.name, _LONGEST_NAME), _UNITS[dof.unit], *of_file, *in_si))
+    for row in _left("...", len(robot.dofs) - most):
+        table.add_row(*_cells(*row))
     yield _indented(table)
 
 
@@ -175,7 +197,11 @@ def _table(*headers: str, right: tuple[int, ...] = ()) -> Table:
 
 def _cells(*values: object) -> Iterator[Text]:
     """Yield texts that rich does not read as markup."""
-    return (Text(one_line(str(v))) for v in values)
+    return (Text(one_line(_short(str(v)))) for v in values)
+
+
+def _short(text: str, most: int = _LONGEST) -> str:
+    return text if len(text) <= most else f"{text[: most - 33]}...{text[-30:]}"
 
 
 def _indented(table: Table) -> RenderableType:

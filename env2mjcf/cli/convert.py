@@ -14,7 +14,7 @@ from tyro.conf import Positional
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags, keywords
 from .program import DONE
-from .terminal import one_line, print_diagnostics, print_json, working
+from .terminal import listed, one_line, print_diagnostics, print_json, working
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,12 @@ class Convert:
         print_diagnostics(result.diagnostics, self.output.verbose)
         if self.output.json:
             print_json(
-                {"xml": result.xml, "assets": result.assets, "report": result.report, "diagnostics": result.diagnostics}
+                {
+                    "xml": result.xml,
+                    "assets": result.assets,
+                    "report": result.report,
+                    "diagnostics": listed(result.diagnostics, self.output.verbose),
+                }
             )
         else:
             path = os.fspath(result.xml)

@@ -15,7 +15,7 @@ from ..errors import Env2MjcfError
 from ..options import Options
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import BAD_INPUT, DONE
-from .terminal import plain, print_diagnostics, print_json, print_parts, working
+from .terminal import listed, plain, print_diagnostics, print_json, print_parts, working
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -68,11 +68,11 @@ class Info:
             facts: dict[str, Any] = self._facts(summary, scene)
             if error:
                 facts["error"] = plain(error.diagnostic)
-            print_json({**facts, "diagnostics": loaded.diagnostics})
+            print_json({**facts, "diagnostics": listed(loaded.diagnostics, self.output.verbose)})
         else:
             print_parts(self._parts(summary, scene))
         # Notes are part of what was asked for.
-        print_diagnostics(loaded.diagnostics, verbose=not self.output.json or self.output.verbose)
+        print_diagnostics(loaded.diagnostics, self.output.verbose, notes=not self.output.json)
         return BAD_INPUT if error else DONE
 
     def _facts(self, summary: SceneSummary, scene: Scene | None) -> dict[str, Any]:
@@ -92,9 +92,10 @@ class Info:
     def _parts(self, summary: SceneSummary, scene: Scene | None) -> Iterator[RenderableType]:
         from .columns import geometry_part, pairs_part, text_part
 
-        yield from text_part(summary)
+        every = self.output.verbose
+        yield from text_part(summary, every)
         if scene is not None:
-            yield from geometry_part(scene.report)
+            yield from geometry_part(scene.report, every)
             if self.pairs:
                 yield from pairs_part(self._counts(scene), self.samples)
 

@@ -11,14 +11,17 @@ from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ..errors import Env2MjcfError, did_you_mean
+from ..errors import Env2MjcfError, abridged, did_you_mean
 from ..system.imports import installed_version
 from . import program
 from .program import BAD_INPUT, BROKEN_PIPE, DONE, FAULT, WRONG_USAGE, ResultsError
-from .terminal import print_diagnostics, print_json, printable, remark, tame_libraries
+from .terminal import listed, print_diagnostics, print_json, printable, remark, tame_libraries
 
 if TYPE_CHECKING:
     from .arguments import Verb
+
+# Lines of a traceback that are shown at most.
+_TRACEBACK = 400
 
 # Each verb: its module here, its class there, what it does.
 VERBS = {
@@ -131,7 +134,7 @@ def _run(name: str, verb: Verb) -> int:
         _show_traceback(verb.output.debug)
         print_diagnostics(error.diagnostics, verb.output.verbose)
         if verb.output.json:
-            print_json({"error": error.diagnostic, "diagnostics": error.diagnostics})
+            print_json({"error": error.diagnostic, "diagnostics": listed(error.diagnostics, verb.output.verbose)})
         return BAD_INPUT
     except (BrokenPipeError, ResultsError):
         raise
@@ -157,7 +160,7 @@ def _fault(error: Exception, debug: bool = False) -> int:
 
 def _show_traceback(debug: bool) -> None:
     if debug or os.environ.get("ENV2MJCF_DEBUG") == "1":
-        print(printable(traceback.format_exc()), end="", file=sys.stderr)
+        print(printable(abridged(traceback.format_exc(), lines=_TRACEBACK)), end="", file=sys.stderr)
 
 
 def _abandon_stdout() -> None:

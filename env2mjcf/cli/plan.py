@@ -18,7 +18,7 @@ from ..options import Options, PathArgument
 from ..system.files import refuse_foreign, refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE, FINDING
-from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts
+from .terminal import listed, loaded, one_line, print_diagnostics, print_json, print_parts, reason_lines
 
 if TYPE_CHECKING:
     from ..planning.result import Plan as Result
@@ -104,7 +104,7 @@ class Plan:
             )  # fmt: skip
         written = self._write(scene, query, result)
         if self.output.json:
-            print_json({**_summary(scene, result, written), "diagnostics": tuple(log)})
+            print_json({**_summary(scene, result, written), "diagnostics": listed(log, self.output.verbose)})
         else:
             print_parts(_lines(result, written))
         return DONE if result.solved else FINDING
@@ -144,12 +144,12 @@ class Plan:
 
     def _say_wrong(self, wrong: list[tuple[str, tuple[str, ...]]], log: DiagnosticLog) -> None:
         if self.output.json:
-            print_json({"solved": False, "invalid": dict(wrong), "diagnostics": tuple(log)})
+            print_json({"solved": False, "invalid": dict(wrong), "diagnostics": listed(log, self.output.verbose)})
             return
         parts: list[Text] = []
         for label, reasons in wrong:
             parts.append(Text.assemble(f"{label}: ", ("not valid", "bold red")))
-            parts.extend(Text(f"    {one_line(reason)}") for reason in reasons)
+            parts.extend(reason_lines(reasons, self.output.verbose))
         print_parts(parts)
 
 

@@ -18,7 +18,7 @@ from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
-from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts
+from .terminal import listed, loaded, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..contact.types import Contact
@@ -94,7 +94,7 @@ class Play:
         if self.output.json:
             touching = [sorted({(c.link, c.other) for c in found}) for found in made.touching]
             facts = {"film": self.out, "pictures": len(made.q), "fps": made.fps, "configurations": made.q}
-            print_json({**facts, "touching": touching, "diagnostics": tuple(log)})
+            print_json({**facts, "touching": touching, "diagnostics": listed(log, self.output.verbose)})
         else:
             print_parts(_lines(made))
         return DONE

@@ -159,5 +159,7 @@ def describe(error: BaseException) -> str:
         return "there is not enough memory"
     if number in (errno.EMFILE, errno.ENFILE):
         return f"{os.strerror(number)}: ask for more of them (ulimit -n)"
-    said = "".join(traceback.format_exception_only(error)).strip().replace("\n", "; ")
+    from ..errors import abridged
+
+    said = abridged("".join(traceback.format_exception_only(error)).strip()).replace("\n", "; ")
     return f"a fault of env2mjcf, please report it: {said} (--debug shows where)"

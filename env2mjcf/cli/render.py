@@ -13,7 +13,7 @@ from ..options import Options
 from ..system.files import refuse_unwritable
 from .arguments import OptionFlags, Output, OutputFlags, camera_of, size_of
 from .program import DONE
-from .terminal import loaded, one_line, print_diagnostics, print_json, print_parts, working
+from .terminal import listed, loaded, one_line, print_diagnostics, print_json, print_parts, working
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,8 @@ class Render:
             )  # fmt: skip
         touching = sorted({(c.link, c.other) for c in scene.contacts(rows[0])}) if self.contacts else []
         if self.output.json:
-            print_json({"picture": self.out, "size": size, "touching": touching, "diagnostics": tuple(log)})
+            facts = {"picture": self.out, "size": size, "touching": touching}
+            print_json({**facts, "diagnostics": listed(log, self.output.verbose)})
         else:
             lines = [Text(f"    {one_line(a)} touches {one_line(b)}") for a, b in touching]
             print_parts([Text(f"{one_line(self.out)}: {size[0]} x {size[1]} pixels", "bold"), *lines])

@@ -13,20 +13,23 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic, Severity, is_tricky, one_line, printable
+from ..diagnostics import DiagnosticLog, few
+from ..errors import Diagnostic, Severity, abridged, is_tricky, one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.text import Text
 
     from ..options import Options
     from ..simulation.scene import Scene
 
+# Reasons of one configuration that are listed.
+_REASONS = 8
 _COLOURS = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity.INFO: "bold cyan"}
 
 
@@ -44,10 +47,10 @@ def format_diagnostic(diagnostic: Diagnostic) -> str:
 
 
 class _Printable(logging.Formatter):
-    """What libraries log, with control characters escaped."""
+    """What libraries log, abridged, with control characters escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return printable(super().format(record))
+        return printable(abridged(super().format(record)))
 
 
 def tame_libraries() -> None:
@@ -66,7 +69,18 @@ def _without_place(message: Warning | str, category: type[Warning], *_: object) 
 
 def remark(message: str) -> None:
     """Print a line about the work, not its results, to stderr."""
-    print(f"env2mjcf: {one_line(message)}", file=sys.stderr)
+    print(f"env2mjcf: {one_line(abridged(message))}", file=sys.stderr)
+
+
+def reason_lines(reasons: Sequence[object], every: bool) -> Iterator[Text]:
+    """Yield why a configuration is not valid: the first reasons, or every one."""
+    from rich.text import Text
+
+    shown = reasons if every else reasons[:_REASONS]
+    for reason in shown:
+        yield Text(f"    {one_line(abridged(str(reason)))}")
+    if len(shown) < len(reasons):
+        yield Text(f"    ... and {len(reasons) - len(shown)} more", "dim")
 
 
 def print_parts(parts: Iterable[RenderableType]) -> None:
@@ -108,13 +122,18 @@ def loaded(path: str, options: Options) -> tuple[Scene, DiagnosticLog]:
         return prepare(path, options, log), log
 
 
-def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False) -> None:
-    """Print diagnostics to stderr; notes only on request."""
+def listed(diagnostics: Iterable[Diagnostic], verbose: bool) -> tuple[Diagnostic, ...]:
+    """Return the diagnostics to show: a few of each code, or all that are kept."""
+    return tuple(diagnostics) if verbose else few(diagnostics)
+
+
+def print_diagnostics(diagnostics: Iterable[Diagnostic], verbose: bool = False, *, notes: bool = False) -> None:
+    """Print a few diagnostics of each code to stderr, all on request; notes only where they are asked for."""
     sys.stdout.flush()  # so that results stand before what is said about them
     console = console_on(sys.stderr, soft_wrap=True)
-    for diagnostic in diagnostics:
-        if verbose or diagnostic.severity is not Severity.INFO:
-            print_diagnostic(console, diagnostic)
+    chosen = (d for d in diagnostics if verbose or notes or d.severity is not Severity.INFO)
+    for diagnostic in listed(chosen, verbose):
+        print_diagnostic(console, diagnostic)
 
 
 def print_diagnostic(console: Console, diagnostic: Diagnostic, path: str = "") -> None:

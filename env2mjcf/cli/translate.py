@@ -16,7 +16,7 @@ from ..limits import LARGEST, Limits
 from ..options import DialectName, PathArgument, Semantics
 from .arguments import Output, OutputFlags
 from .program import DONE
-from .terminal import one_line, print_diagnostics, print_json, print_parts
+from .terminal import listed, one_line, print_diagnostics, print_json, print_parts
 
 if TYPE_CHECKING:
     from ..model.environment import Boundary, Environment
@@ -85,7 +85,7 @@ class Translate:
         print_diagnostics(log, self.output.verbose)
         if self.output.json:
             files = {name: getattr(written, name) for name in ("environment", "robots", "query", "mesh_dirs")}
-            print_json({"dialect": self.dialect, **files, "diagnostics": tuple(log)})
+            print_json({"dialect": self.dialect, **files, "diagnostics": listed(log, self.output.verbose)})
         else:
             print_parts(_lines(result.environment, written))
         return DONE

@@ -17,7 +17,7 @@ from ..options import Options, PathArgument
 from . import program
 from .arguments import OptionFlags, Output, OutputFlags
 from .program import DONE
-from .terminal import loaded, one_line, print_diagnostics, print_json
+from .terminal import listed, loaded, one_line, print_diagnostics, print_json
 
 if TYPE_CHECKING:
     from ..simulation.scene import Scene
@@ -104,7 +104,7 @@ class View:
 
         url = f"http://127.0.0.1:{port}"
         if self.output.json:
-            print_json({"url": url, "port": port, "diagnostics": tuple(log)})
+            print_json({"url": url, "port": port, "diagnostics": listed(log, self.output.verbose)})
         else:
             print(url)
         sys.stdout.flush()

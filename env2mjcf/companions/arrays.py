@@ -16,6 +16,7 @@ from ..diagnostics import DiagnosticLog
 from ..formats.source import read_source
 from ..kinematics.space import ConfigurationSpace, listed
 from ..limits import LARGEST, Limits
+from ..system.files import open_regular
 from ..transforms import Array
 
 _WHAT_TO_DO = "write it with numpy.save(path, array), an array of floats of shape (n, {dim})"
@@ -136,7 +137,7 @@ def coordinates(
 
 def _header(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Return the shape and the type that a file declares, or raise what NumPy does."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         shape, _, dtype = _HEADERS[np.lib.format.read_magic(file)](file)
         length = os.path.getsize(path) - file.tell()
     if min(shape, default=1) < 0 or math.prod(shape) * dtype.itemsize > length:

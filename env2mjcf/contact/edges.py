@@ -98,18 +98,15 @@ class MotionBounds:
     def __init__(self, assembly: Assembly, space: ConfigurationSpace, pairs: Sequence[Pair] = ()) -> None:
         self._robots = assembly.robots
         self._slices = space.robot_slices
-        names = [n for r in assembly.robots for n in r.names]
+        names = {n: i for i, n in enumerate(n for r in assembly.robots for n in r.names)}
         self._shape = (space.dim, len(names))
-        first = [names.index(p.link) for p in pairs]
-        second = [names.index(p.other) for p in pairs]
+        first = [names[p.link] for p in pairs]
+        second = [names[p.other] for p in pairs]
         self._first, self._second = np.array(first, dtype=np.int64), np.array(second, dtype=np.int64)
         dofs = [d for r in assembly.robots for d in r.kinematics.dofs]
         self._slides = np.array([d.kind is DofKind.D for d in dofs], dtype=np.bool_)
         self._bases = [
-            (
-                columns.start
-                + np.array([i for i, d in enumerate(r.kinematics.dofs) if d.body == body and d.connection is None])
-            )
+            columns.start + np.array(list(r.kinematics.base_columns(body).values()))
             for r, columns in zip(assembly.robots, space.robot_slices, strict=True)
             for body in sorted(r.kinematics.tree.bases)
         ]

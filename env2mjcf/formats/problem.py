@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from itertools import islice
 from typing import NoReturn
 
-from ..errors import did_you_mean
+from ..errors import did_you_mean, enumeration
 from ..model.environment import Boundary, BoundaryShape, PlannerRules
 from ..options import Options
 from .blocks import read_coordinate
@@ -159,7 +158,7 @@ def _read_labels(problem: Node) -> _Labels:
 def _fail_unknown(
     node: Node, who: str, what: str, label: str, known: Collection[str], code: str, at: str, hint: str = ""
 ) -> NoReturn:
-    message = f"{who} the unknown {what} {label!r}; expected one of: {_some(known) or 'none'}"
+    message = f"{who} the unknown {what} {label!r}; expected one of: {_quoted(known) or 'none'}"
     node.fail(code, message, hint=hint or did_you_mean(label, known) or f"name a {what} of this file", at=at)
 
 
@@ -202,7 +201,7 @@ def _read_group_task(node: Node, labels: _Labels) -> tuple[ProblemPart, ...]:
         return ()
     idle = [r for r in labels.groups[group] if r not in parts]
     if idle:
-        message = f"robots of group {group!r} without a task in the group task {label!r}: {_some(idle)}; they stay"
+        message = f"robots of group {group!r} without a task in the group task {label!r}: {_quoted(idle)}; they stay"
         node.log.info("ENV186", f"<{node.tag}>", message, span=node.span)
     if len(counts := {len(p.rows) for p in parts.values()}) > 1:
         message = (
@@ -247,9 +246,8 @@ def _read_points(task: Node, tag: str) -> list[tuple[float, ...]]:
     return rows
 
 
-def _some(labels: Collection[str]) -> str:
-    """Return the first twelve labels, for a message."""
-    return ", ".join(map(repr, islice(labels, 12))) + (", ..." if len(labels) > 12 else "")
+def _quoted(labels: Collection[str]) -> str:
+    return enumeration([repr(label) for label in labels])
 
 
 def _numbers(scan: Scanner) -> tuple[float, ...]:

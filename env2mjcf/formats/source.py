@@ -174,7 +174,7 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
         holds = f"; it holds {', '.join(inside[:8])}" if inside else ""
         fail("ENV102", f"{name} is a folder; expected a file", f"name the file in it{holds}")
     try:
-        with open_regular(name) if regular else open(name, "rb") as file:
+        with open_regular(name, or_pipe=not regular) as file:
             # One more than allowed: the size that the system states does not bound pipes and devices.
             data = read_at_most(file, limits.file_bytes + 1)
     except FileNotFoundError:

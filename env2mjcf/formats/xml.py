@@ -200,7 +200,8 @@ class Node:
                 self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
                 continue
             message = f"attribute {name!r} of <{self.tag}> is not used"
-            self.log.info("ENV311", f"<{self.tag}>", message, hint=did_you_mean(name, known), span=span)
+            hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
+            self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
 
     def _first(self, name: str) -> bool:
         """Whether something of this name in elements of this kind was not told before."""

@@ -172,19 +172,32 @@ class RobotKinematics:
         if kind is BaseKind.FIXED:
             return pose_matrix(self.multibody.bodies[body].pose)
         zeros = np.zeros(q.shape[:-1])
-        value = {d.kind: q[..., i] for i, d in enumerate(self.dofs) if d.connection is None and d.body == body}
+        value = {kind: q[..., i] for kind, i in self.base_columns(body).items()}
         rotation = rotation_matrix(*(value.get(k, zeros) for k in ROTATIONS))
         return transform(rotation, np.stack([value.get(k, zeros) for k in POSITIONS], axis=-1))
 
+    def base_columns(self, body: int) -> dict[DofKind, int]:
+        """Return the place in a configuration of each degree of freedom of a body's base; none where it has none."""
+        return self._base_columns.get(body, {})
+
     @lazy_property
-    def _columns(self) -> dict[tuple[int, DofKind], int]:
+    def _base_columns(self) -> dict[int, dict[DofKind, int]]:
+        columns: dict[int, dict[DofKind, int]] = {}
+        for i, dof in enumerate(self.dofs):
+            if dof.connection is None:
+                columns.setdefault(dof.body, {})[dof.kind] = i
+        return columns
+
+    @lazy_property
+    def columns(self) -> dict[tuple[int, DofKind], int]:
+        """The place in a configuration of each degree of freedom of a connection."""
         return {(d.connection, d.kind): i for i, d in enumerate(self.dofs) if d.connection is not None}
 
     def _dh_values(self, k: int, q: Array) -> tuple[Array, Array, Array]:
         """Return alpha, d and theta of a connection: the file's, but where a degree of freedom replaces one."""
 
         def value(kind: DofKind, default: float) -> Array:
-            column = self._columns.get((k, kind))
+            column = self.columns.get((k, kind))
             return np.asarray(default) if column is None else q[..., column]
 
         dh = self.multibody.connections[k].dh
@@ -193,7 +206,7 @@ class RobotKinematics:
     def _arm(self, k: int, slide: Sequence[float]) -> float:
         """Length of the way from a connection's DH frame to the origin of its next body."""
         connection = self.multibody.connections[k]
-        column = self._columns.get((k, DofKind.D))
+        column = self.columns.get((k, DofKind.D))
         d = abs(connection.dh.d) if column is None else slide[column]
         return abs(connection.dh.a) + d + _norm(connection.to_body)
 
@@ -249,7 +262,7 @@ def _joint_values(robot: RobotKinematics, k: int, poses: Array) -> dict[DofKind,
     between = inverse(poses[..., connection.previous, :, :]) @ poses[..., connection.next, :, :]
     row = inverse(pose_matrix(connection.to_dh)) @ between @ inverse(pose_matrix(connection.to_body))
     craig = robot.multibody.dh_form is DHForm.CRAIG
-    moves_alpha = any(d.connection == k and d.kind is DofKind.ALPHA for d in robot.dofs)
+    moves_alpha = (k, DofKind.ALPHA) in robot.columns
     if not moves_alpha:
         alpha = np.full(row.shape[:-2], connection.dh.alpha)
     elif craig:

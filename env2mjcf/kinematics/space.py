@@ -331,9 +331,12 @@ def _layout(robots: Sequence[RobotKinematics], slices: Sequence[slice]) -> tuple
     for robot, columns in zip(robots, slices, strict=True):
         slots: list[Slot] = []
         for body, kinds, free in _joints_depth_first(robot):
-            where = {(d.connection, d.kind): columns.start + i for i, d in enumerate(robot.dofs) if d.body == body}
             placed_by = robot.tree.parent[body]
-            indices = tuple(where[(placed_by, kind)] for kind in kinds)
+            if placed_by is None:
+                own = robot.base_columns(body)
+            else:
+                own = {kind: robot.columns[placed_by, kind] for kind in kinds}
+            indices = tuple(columns.start + own[kind] for kind in kinds)
             for group in [indices] if free else [(i,) for i in indices]:
                 slots.append(Slot(body, group, address, free))
                 address += 7 if free else 1
@@ -348,8 +351,7 @@ def _joints_depth_first(robot: RobotKinematics) -> Iterator[tuple[int, tuple[Dof
         k = robot.tree.parent[body]
         if k is None:
             free = robot.tree.bases[body] is BaseKind.VOLUMETRIC_ROTATIONAL
-            kinds = tuple(d.kind for d in robot.dofs if d.connection is None and d.body == body)
-            yield body, kinds, free
+            yield body, tuple(robot.base_columns(body)), free
         else:
             yield body, joint_kinds(robot, k), False
         stack += children_first_to_last(robot, body)[::-1]

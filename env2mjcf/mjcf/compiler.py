@@ -10,7 +10,7 @@ from lxml import etree
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly
 from ..kinematics.space import ConfigurationSpace
-from ..model.environment import Task
+from ..model.environment import Environment, Task
 from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable

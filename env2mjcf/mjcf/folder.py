@@ -53,9 +53,13 @@ class Staged:
         self._retired: Path | None = None
         self._file: IO[bytes] | None = None
         self._begun = False
+        # What is not there yet, the innermost first.
+        self._made_folders = [f for f in (folder / ASSET_FOLDER, folder, *folder.parents) if not f.exists()]
         (folder / ASSET_FOLDER).mkdir(parents=True, exist_ok=True)
         try:
             with folder_lock(folder):
+                # Another process may just have removed one that was of no use to it.
+                (folder / ASSET_FOLDER).mkdir(parents=True, exist_ok=True)
                 with suppress(OSError):
                     _remove_stale(folder)
                 self._begun = True
@@ -110,13 +114,14 @@ class Staged:
             _remove(self.folder, self._retired)
 
     def discard(self) -> None:
-        """Remove the staged MJCF and the assets that were written for it."""
+        """Remove the staged MJCF, the assets that were written for it, and the folders that were made for both."""
         self._close()
-        if not self._begun:
-            return
         with suppress(OSError, FolderBusyError), folder_lock(self.folder):
-            _remove(self.folder, self.path, self._made)
-            self._remove_retired()
+            if self._begun:
+                _remove(self.folder, self.path, self._made)
+                self._remove_retired()
+            for folder in self._made_folders:
+                folder.rmdir()  # fails where somebody else has put something there
 
     def _close(self) -> None:
         if self._file is not None:

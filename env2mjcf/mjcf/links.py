@@ -112,7 +112,7 @@ def _add_link(
 
 
 def _has_slides(robot: RobotParts, body: int) -> bool:
-    kinds = {d.kind for d in robot.kinematics.dofs if d.connection is None and d.body == body}
+    kinds = set(robot.kinematics.base_columns(body))
     return bool(kinds) and DofKind.RX not in kinds
 
 

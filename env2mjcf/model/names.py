@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from pathlib import PurePosixPath
 
-from .environment import Environment, MultiBody
+from .environment import Environment
 
 # '/' and ':' are separators in MuJoCo names of this project; '\0' stands for what cannot be seen.
 _UNFIT = re.compile(r"[\0/:\s]+|[^\x00-\uffff]")
@@ -66,17 +66,17 @@ def body_names(environment: Environment) -> dict[int, tuple[str, ...]]:
     """
     stems = [mesh_stem(b.filename) for m in environment.multibodies for b in m.bodies]
     names = iter(unique(stems))
-    robots = environment.robots
+    numbers = robot_numbers(environment)
     result: dict[int, tuple[str, ...]] = {}
     for i, multibody in enumerate(environment.multibodies):
         own = tuple(next(names) for _ in multibody.bodies)
-        number = robot_index(robots, multibody)
-        if number is not None and len(robots) > 1:
+        number = numbers.get(id(multibody))
+        if number is not None and len(numbers) > 1:
             own = tuple(f"robot{number}/{n}" for n in own)
         result[i] = own
     return result
 
 
-def robot_index(robots: tuple[MultiBody, ...], multibody: MultiBody) -> int | None:
-    """Return which robot a multibody is, or None; equal multibodies are told apart by identity."""
-    return next((k for k, r in enumerate(robots) if r is multibody), None)
+def robot_numbers(environment: Environment) -> dict[int, int]:
+    """Return which robot a multibody is, by its `id`: equal multibodies are told apart by identity."""
+    return {id(robot): number for number, robot in enumerate(environment.robots)}

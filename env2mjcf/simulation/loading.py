@@ -11,6 +11,7 @@ import numpy as np
 from ..contact.arena import ROOM_HINT, lack, new_data
 from ..contact.exact.engine import require
 from ..diagnostics import DiagnosticLog
+from ..errors import Span
 from ..mjcf.scenery import possible_contacts
 from ..model.environment import Dialect, Environment
 from ..options import OptionKeywords, Options, PathArgument
@@ -65,8 +66,9 @@ def prepare(source: PathArgument | Environment, options: Options, log: Diagnosti
         compiled = recompile(compiled, touching, DiagnosticLog())
         scene, touching = _scene(compiled, log), ()
     known = {(p.link, p.other): p for p in compiled.pairs.tested}
+    places = {p.name: p.body.span for p in compiled.assembly.links}
     for pair in touching[:_LISTED]:
-        _report_touching(compiled, known[pair], log)
+        _report_touching(compiled, known[pair], places[pair[0]], log)
     if len(touching) > _LISTED:
         message = f"{len(touching)} pairs of bodies touch at home, of which {_LISTED} are listed"
         say = log.info if all(_expected(compiled, known[pair]) for pair in touching[_LISTED:]) else log.warn
@@ -110,16 +112,15 @@ def _report_shortage(scene: Scene, log: DiagnosticLog) -> None:
             log.warn("MJC405", scene.environment.name, message, hint=ROOM_HINT)
 
 
-def _report_touching(compiled: Compiled, pair: Pair, log: DiagnosticLog) -> None:
+def _report_touching(compiled: Compiled, pair: Pair, span: Span | None, log: DiagnosticLog) -> None:
     link, other = pair.link, pair.other
-    body = next(p.body for p in compiled.assembly.parts() if p.name == link)
     if _expected(compiled, pair):
         message = f"{link} and {other} touch at home, where the base is at the origin"
         hint = "" if compiled.environment.tasks else "give a query: simulations can begin at its start"
-        log.info("KIN312", link, message, hint=hint, span=body.span)
+        log.info("KIN312", link, message, hint=hint, span=span)
         return
     hint = "exclude such pairs with exclude_rest_contacts=True (--exclude-rest-contacts) if they always touch"
-    log.warn("KIN312", link, f"{link} and {other} touch at home", hint=hint, span=body.span)
+    log.warn("KIN312", link, f"{link} and {other} touch at home", hint=hint, span=span)
 
 
 def _expected(compiled: Compiled, pair: Pair) -> bool:

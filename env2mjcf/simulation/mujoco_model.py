@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import mujoco
 
@@ -47,8 +48,10 @@ def load_file(path: Path, document: Document, assembly: Assembly, log: Diagnosti
     Raises:
         ConversionError: MuJoCo refuses it.
     """
-    # Loading it without a spec, MuJoCo writes its warnings to a file in the current folder.
-    return _compiled(lambda: mujoco.MjSpec.from_file(str(path)), document, assembly, log)
+    # Loading it without a spec, MuJoCo writes its warnings to a file in the current folder. Bytes, because it takes no
+    # text that is not UTF-8.
+    name: Any = os.fsencode(path)
+    return _compiled(lambda: mujoco.MjSpec.from_file(name), document, assembly, log)
 
 
 def _compiled(

@@ -10,6 +10,7 @@ import stat
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import IO, NoReturn
 
@@ -253,26 +254,63 @@ def refuse_replacement(out: Path, code: str, why: str, hint: str = _ANOTHER) -> 
 
 
 class NoRegularFileError(OSError):
-    """A pipe, a socket or a device where a file was expected: it may keep its reader waiting for ever."""
+    """A pipe, a device or the like where a file was expected: it may keep its reader waiting for ever."""
 
     def __init__(self, path: PathArgument) -> None:
-        super().__init__(errno.EINVAL, "it is not a regular file but a pipe, a socket or a device", os.fspath(path))
+        what = "it is not a regular file but a pipe, a socket, a device, or a view of the system in /proc or /sys"
+        super().__init__(errno.EINVAL, what, os.fspath(path))
 
 
-def open_regular(path: PathArgument) -> IO[bytes]:
+def open_regular(path: PathArgument, *, or_pipe: bool = False) -> IO[bytes]:
     """Open a regular file to read from it, and wait for nothing.
 
+    Args:
+        path: The file.
+        or_pipe: Whether a pipe, or the terminal that is the standard input, will do, too; it is waited for.
+
     Raises:
-        NoRegularFileError: It is a pipe, a socket or a device.
+        NoRegularFileError: It is something else.
         OSError: It is a folder, or cannot be opened.
         ValueError: There is a NUL character in its name.
     """
-    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115  the caller closes it
-    # Asked of what is open: the name may mean another file by now.
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+    # Some devices act as soon as they are opened.
+    waits = _refuse_unread(path, os.stat(path), or_pipe)
+    file = open(path, "rb", opener=None if waits else _without_waiting)  # noqa: SIM115  the caller closes it
+    try:
+        # Asked of what is open, too: the name may mean another file by now.
+        _refuse_unread(path, os.fstat(file.fileno()), or_pipe)
+    except NoRegularFileError:
         file.close()
-        raise NoRegularFileError(path)
+        raise
     return file
+
+
+def _refuse_unread(path: PathArgument, found: os.stat_result, or_pipe: bool) -> bool:
+    """Refuse what is not read; return whether it has to be waited for. Folders are left to the system to refuse."""
+    mode = found.st_mode
+    if or_pipe and (stat.S_ISFIFO(mode) or (stat.S_ISCHR(mode) and _is_standard_input(found))):
+        return True
+    # Files of /proc and /sys call themselves regular. Some wait for the kernel, and to read its log takes it away.
+    if not stat.S_ISDIR(mode) and (not stat.S_ISREG(mode) or found.st_dev in _views_of_the_system()):
+        raise NoRegularFileError(path)
+    return False
+
+
+def _is_standard_input(found: os.stat_result) -> bool:
+    try:
+        return os.path.samestat(found, os.fstat(0))
+    except OSError:  # it is closed
+        return False
+
+
+@cache
+def _views_of_the_system() -> frozenset[int]:
+    """Return the devices of the file systems whose files the kernel makes up while they are read."""
+    devices: set[int] = set()
+    for folder in ("/proc", "/sys"):
+        with suppress(OSError):
+            devices.add(os.stat(folder).st_dev)
+    return frozenset(devices - {os.stat(os.sep).st_dev})
 
 
 def _without_waiting(path: str, flags: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from types import ModuleType
 from typing import IO, Any, Protocol
 
@@ -18,6 +19,9 @@ _HEADER = ("the number of parts", "the number of vertices", "the number of polyg
 
 # Faults that numbers without a blank between them may cause.
 _FAULTS_OF_COLUMNS = ("GEO209", "GEO211", "GEO213", "GEO214", "GEO215", "GEO216")
+
+# Guesses of columns that are tried: of a file as Fortran prints it, one of the first is right.
+_TRIALS = 4
 
 
 class TriangleMesh(Protocol):
@@ -66,7 +70,7 @@ def read_byu(text: str | bytes, path: str, log: DiagnosticLog, limits: Limits) -
 
 def _read_columns(numbers: Numbers, path: str, log: DiagnosticLog, limits: Limits) -> MeshArrays | None:
     """Read a file whose numbers touch; None where that is not what is wrong with it."""
-    for layout in column_layouts(numbers.data):
+    for layout in islice(column_layouts(numbers.data), _TRIALS):
         trial = DiagnosticLog(log.strict)
         file = NumberFile.of(layout, path, trial, limits)
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,6 @@ from ..source import DOTS, quoted
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
-_FIELD = re.compile(rb" *[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?")
-_POINT = re.compile(rb"[.eEdD]")
 _D_TO_E = bytes.maketrans(b"dD", b"eE")
 _LINE = re.compile(rb"[^\r\n]+")
 _BLANKS = re.compile(rb"\s")
@@ -35,7 +34,13 @@ _BLANK = _table(b" \t\n\v\f\r")
 _NUMERIC = _table(b" \t\n\v\f\r0123456789+-.eE")
 _SIGN = _table(b"+-")
 _EXPONENT = _table(b"eE")
+_EXPONENTS = _table(b"eEdD")
 _FRACTION = _table(b".eEdD")
+_ENDS = _table(b"\r\n")
+_SPACE = ord(" ")
+
+# Widths of columns, of integers and of other numbers.
+_WIDTHS = ((8, 6, 10, 5, 7, 9, 12), (12, 10, 13, 14, 15, 16, 20, 8))
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,28 +164,78 @@ def column_layouts(data: bytes) -> Iterator[bytes]:
     Fortran's `10I6` prints 100000 100001 as `100000100001`. Lines of integers have one width, lines of other
     numbers another. Each pair of widths that every line fits gives one text; the widths of MOVIE.BYU come first.
     """
-    lines = _LINE_END.split(data)
-    integers = [line for line in lines if line.strip() and not _POINT.search(line)]
-    others = [line for line in lines if _POINT.search(line)]
-    for integer_width in _widths(integers, (8, 6, 10, 5, 7, 9, 12)):
-        for other_width in _widths(others, (12, 10, 13, 14, 15, 16, 20, 8)):
-            if integer_width or other_width:
-                yield b"\n".join(
-                    b" ".join(_columns(x, other_width if _POINT.search(x) else integer_width)) for x in lines
-                )
+    blocks = [_Columns(block) for block in _blocks(data)]
+    integers, others = (
+        [w for w in widths if all(b.fits(w, kind) for b in blocks) and any(b.cuts(w, kind).size for b in blocks)]
+        for kind, widths in enumerate(_WIDTHS)
+    )
+    # Last of each 0, which cuts nothing.
+    for widths in product([*integers, 0], [*others, 0]):
+        if any(widths):
+            yield b"".join(block.cut(widths) for block in blocks)
 
 
-def _widths(lines: list[bytes], candidates: tuple[int, ...]) -> Iterator[int]:
-    """Yield the widths of which every line is made; last 0, which cuts nothing."""
-    for width in candidates:
-        if lines and all(all(_FIELD.fullmatch(field) for field in _columns(line, width)) for line in lines):
-            yield width
-    yield 0
+def _blocks(data: bytes) -> Iterator[bytes]:
+    at = 0
+    while at < len(data):
+        end = _LINE_END.search(data, at + _CHUNK)
+        yield data[at : end.end() if end else len(data)]
+        at = end.end() if end else len(data)
 
 
-def _columns(line: bytes, width: int) -> list[bytes]:
-    line = line.rstrip()
-    # Fortran aligns to the right, so that a line's length without trailing blanks is a multiple of the width.
-    if width and len(line) % width:
-        return [line]
-    return [line[i : i + width] for i in range(0, len(line), width)] if width else [line]
+class _Columns:
+    """Some lines of a text, and where numbers in them may touch.
+
+    Args:
+        data: The lines.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._chars = chars = np.frombuffer(data, dtype=np.uint8)
+        ends = _ENDS[chars]
+        row = np.cumsum(ends, dtype=np.int32) - ends
+        begins = np.concatenate([[0], np.flatnonzero(ends) + 1]).astype(np.int32)
+        column = np.arange(len(chars), dtype=np.int32) - begins[row]
+        filled = ~_BLANK[chars]
+        # Fortran aligns to the right, so that a line's length without trailing blanks is a multiple of the width.
+        length = np.zeros(len(begins), dtype=np.int32)
+        np.maximum.at(length, row[filled], column[filled] + 1)
+        kind = np.zeros(len(begins), dtype=np.int8)
+        kind[row[_FRACTION[chars]]] = 1
+        before = np.concatenate([[False], filled[:-1]])
+        before[begins[begins < len(chars)]] = False
+        inside = column < length[row]
+        # Where a number ends in front of a blank, and where a sign stands that no exponent has.
+        gaps = inside & ~filled & before
+        signs = _SIGN[chars] & before
+        signs[1:] &= ~_EXPONENTS[chars[:-1]]
+        self._odd = bool((inside & ~filled & (chars != _SPACE)).any())
+        self._begins, self._length, self._kind = begins.astype(np.int64), length, kind
+        self._filled = filled
+        joints = np.flatnonzero(gaps | signs)
+        self._spaced = np.zeros(len(begins), dtype=bool)
+        self._spaced[row[joints]] = True
+        of_kind = kind[row[joints]]
+        self._joints = [column[joints[of_kind == k]] for k in (0, 1)]
+
+    def fits(self, width: int, kind: int) -> bool:
+        """Whether every line of a kind (0 integers, 1 other numbers) is columns of a width, or one number."""
+        if self._odd or (self._joints[kind] % width).any():
+            return False
+        # A line of several numbers that is not cut has none of them in columns.
+        whole = (self._length % width != 0) & self._spaced & (self._kind == kind)
+        last = self.cuts(width, kind) - 1
+        return not whole.any() and bool(self._filled[last].all())
+
+    def cuts(self, width: int, kind: int) -> NDArray[np.int64]:
+        """Return where columns of a width begin within the lines of a kind."""
+        lines = np.flatnonzero((self._length % width == 0) & (self._kind == kind) & (self._length > width))
+        counts = self._length[lines] // width - 1
+        before = np.cumsum(counts) - counts
+        of_line = np.arange(counts.sum()) - np.repeat(before, counts) + 1
+        return np.repeat(self._begins[lines], counts) + width * of_line
+
+    def cut(self, widths: tuple[int, int]) -> bytes:
+        """Return the lines with a blank in front of every column that does not begin its line."""
+        places = [self.cuts(w, kind) for kind, w in enumerate(widths) if w]
+        return np.insert(self._chars, np.concatenate(places), _SPACE).tobytes()
