@@ -235,11 +235,16 @@ class TestEightBottles:
 
     @pytest.mark.slow
     @pytest.mark.parametrize("engine", ["exact", "mujoco"])
-    def test_by_contacts_and_by_the_program(self, folder: Path, engine: str, capfd: pytest.CaptureFixture[str]) -> None:
-        path = eight_about_one(folder, 64)
+    def test_by_contacts_and_by_the_program(
+        self, folder: Path, engine: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        # A megabyte holds a third of them.
+        monkeypatch.setattr(scenery, "memory", lambda *_: 1 << 20)
+        path = eight_about_one(folder, 8)
         scene = env2mjcf.load(path, engine=engine)
+        assert scene.model.narena == 1 << 20
         assert {c.other for c in scene.contacts(scene.space.home)} == set(scene.obstacle_names)
-        assert main(["check", str(path), "--engine", engine, "--config", "0 0 0 0 0 0"]) == 1
+        assert main(["check", str(path), *"000000", "--engine", engine]) == 1
         shown = capfd.readouterr()
         assert all(re.search(rf"\b{name}\b", shown.out) for name in scene.obstacle_names)
 
