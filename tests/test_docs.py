@@ -47,7 +47,7 @@ def follow(page: Path, folder: Path) -> None:
         pytest.fail(done.stderr)
 
 
-@pytest.mark.slow_but("engines", "format", "testing")
+@pytest.mark.slow_but("engines", "format/kinematics", "format/readings", "testing")
 @pytest.mark.parametrize("page", [p for p in WITH_EXAMPLES if p != TUTORIAL], ids=name)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     # As a reader in the checkout would run them, one after the other; what they write stays in the copy.

@@ -6,8 +6,8 @@ What the files look like: docs/format/companions.md.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from ..diagnostics import DiagnosticLog
@@ -237,6 +237,15 @@ def read_query(source: Source, dofs: Sequence[int], log: DiagnosticLog) -> tuple
         Task((robot,), tuple(row.configuration for row, _ in own), span=own[0][1])
         for robot, own in sorted(groups.items())
     )
+
+
+def tasks_alone(task: Task, dofs: Sequence[int]) -> Iterator[Task]:
+    """Yield what each robot of a task does alone; `dofs` are the numbers of degrees of freedom of all robots."""
+    at = 0
+    for robot in task.robots:
+        columns = slice(at, at + dofs[robot])
+        yield replace(task, robots=(robot,), configurations=tuple(c[columns] for c in task.configurations))
+        at += dofs[robot]
 
 
 def query_text(tasks: Iterable[Task], *, index: bool) -> str:

@@ -38,10 +38,7 @@ _PART, _LXML_NESTING = 1 << 14, 250
 # How the versions of lxml call what is longer than they take.
 _TOO_LONG = re.compile("too (?:big|long)|XML_PARSE_HUGE|huge text node|Huge input lookup")
 # What collision checkers say about pairs, in lower case.
-_PAIR_RULES = (
-    *("ignoreselfcollision", "ignoreadjacentlinks", "ignoreiadjacentlinks", "ignore_i_adjacent_links"),
-    *("ignoresiblingcollisions", "interrobotcollision"),
-)
+_PAIR_RULES = re.compile("ignore_?(self_?collision|(i_?)?adjacent_?links|sibling_?collisions)|inter_?robot_?collision")
 _PROBLEM_ROOT = re.compile(r"<(motion_?planning)\b", re.IGNORECASE)
 _PROBLEM_END = re.compile(r"</(?:MP)?Problem\s*>", re.IGNORECASE)
 
@@ -176,16 +173,15 @@ class Node:
 
     def ignore_other_children(self, *known: str) -> None:
         """Report the child elements that nothing reads, one of each kind in a file, all in one diagnostic."""
-        folded = {k.lower() for k in known}
-        others: dict[str, Node] = {}
+        folded, others = {k.lower() for k in known}, dict[str, Node]()
         for child in self.children():
             if child.tag.lower() not in folded and self._first(f"<{child.tag}>"):
                 others[f"<{child.tag}>"] = child
         if others:
-            listed = ", ".join(list(others)[:12]) + (", ..." if len(others) > 12 else "")
-            first = next(iter(others.values()))
-            hint = did_you_mean(first.tag, known) if len(others) == 1 else ""
-            message = f"{listed} of <{self.tag}> {'is' if len(others) == 1 else 'are'} not used"
+            first, one = next(iter(others.values())), len(others) == 1
+            listed = ", ".join(list(others)[:12]) + ", ..." * (len(others) > 12)
+            message = f"{listed} of <{self.tag}> {'is' if one else 'are'} not used"
+            hint = did_you_mean(first.tag, known) if one else ""
             self.log.info("ENV307", f"<{first.tag}>", message, hint=hint, span=first.span)
 
     def ignore_other_attributes(self, *known: str) -> None:
@@ -194,20 +190,19 @@ class Node:
         places = self._values() if others else {}
         for name in others:
             span = self.source.span(*places[name]) if name in places else self.span
-            if name.lower() in _PAIR_RULES and self.tag.lower() != "collisiondetection":
+            if _PAIR_RULES.fullmatch(name.lower()) and self.tag.lower() != "collisiondetection":
                 message = f"{name!r} of <{self.tag}> is not followed: it counts on <CollisionDetection>"
                 hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
                 self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
-                continue
-            message = f"attribute {name!r} of <{self.tag}> is not used"
-            hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
-            self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
+            else:
+                message = f"attribute {name!r} of <{self.tag}> is not used"
+                hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
+                self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
 
     def _first(self, name: str) -> bool:
         """Whether something of this name in elements of this kind was not told before."""
-        before = len(self.document.told)
-        self.document.told.add((self.tag, name))
-        return len(self.document.told) > before
+        told, kind = self.document.told, (self.tag, name)
+        return kind not in told and not told.add(kind)
 
     def ignore(self, message: str) -> None:
         """Report that nothing reads this element."""

@@ -144,17 +144,13 @@ class ConfigurationSpace:
         return limits / self._units
 
     def columns(self, robots: Iterable[int]) -> NDArray[np.int64]:
-        """Return the columns of some robots, in the order of these."""
-        every = np.arange(self.dim)
-        return np.concatenate([every[:0], *(every[self.robot_slices[i]] for i in robots)])
+        """Return the columns of some robots, in their order."""
+        return np.array([c for i in robots for c in range(self.dim)[self.robot_slices[i]]], dtype=np.int64)
 
     def standing(self, tasks: Iterable[Task], rest: Array | None = None, *, radians: bool = False) -> Array:
-        """Return where robots stand that do not move, (dim,): at the start of their first task, else where `rest` is.
+        """Return where robots stand that do not move, (dim,): at the start of their first task, else as in `rest`.
 
-        Args:
-            tasks: Of some robots.
-            rest: (dim,) for robots without a task; home by default.
-            radians: Whether the tasks' numbers are radians and metres instead of the file's own.
+        That is home by default. With `radians`, the tasks' numbers are radians and metres.
         """
         q, unplaced = np.array(self.home if rest is None else rest), np.ones(self.dim, dtype=bool)
         for task in tasks:
@@ -165,17 +161,16 @@ class ConfigurationSpace:
         return q
 
     def of_tasks(self, tasks: Sequence[Task], rest: Array | None = None, *, radians: bool = False) -> Iterator[Array]:
-        """Yield the configurations of each task, (k, dim), its robots among others that stand; see `standing`."""
-        standing = self.standing(tasks, rest, radians=radians)
+        """Yield the configurations of each task, (k, dim), among robots that stand; see `standing`."""
+        rest = self.standing(tasks, rest, radians=radians)
         for task in tasks:
-            q = np.tile(standing, (len(task.configurations), 1))
+            q = np.tile(rest, (len(task.configurations), 1))
             q[:, self.columns(task.robots)] = self._rows(task, radians)
             yield q
 
     def _rows(self, task: Task, radians: bool) -> Array:
-        columns = self.columns(task.robots)
-        rows = np.array(task.configurations, dtype=np.float64).reshape(-1, len(columns))
-        return rows if radians else rows * self._units[columns]
+        units = self._units[self.columns(task.robots)]
+        return np.array(task.configurations, dtype=np.float64).reshape(-1, len(units)) * (1.0 if radians else units)
 
     def qpos(self, q: ArrayLike) -> Array:
         """Turn q (..., dim) into MuJoCo's qpos (..., nq)."""

@@ -5,8 +5,7 @@ Words of the file format stay as they are. Lengths are in file units, angles in 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -263,13 +262,7 @@ class Resolution:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Configurations to be visited in turn by one robot, or by several together, in the file's own numbers.
-
-    Attributes:
-        robots: Indices of the robots, in the order of `Environment.robots`.
-        configurations: Start, via and goal: the numbers of each robot, in the order of `robots`, one after the other.
-        label: Name of the task in a problem file.
-    """
+    """Configurations in the file's numbers that `robots` (indices) visit in turn, together: theirs side by side."""
 
     robots: tuple[int, ...]
     configurations: tuple[tuple[float, ...], ...]
@@ -280,15 +273,6 @@ class Task:
     def robot(self) -> int:
         """The first of its robots."""
         return self.robots[0]
-
-    def of_each(self, dofs: Sequence[int]) -> Iterator[Task]:
-        """Yield the task of each of its robots alone, for the numbers of degrees of freedom of all robots."""
-        at = 0
-        for robot in self.robots:
-            columns = slice(at, at + dofs[robot])
-            own = tuple(c[columns] for c in self.configurations)
-            yield replace(self, robots=(robot,), configurations=own)
-            at += dofs[robot]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from ..formats.detect import detect
 from ..formats.env import read_robot
 from ..formats.lexer import Scanner
 from ..formats.reading import robot_dofs
-from ..formats.rows import number_lines, query_text
+from ..formats.rows import number_lines, query_text, tasks_alone
 from ..formats.source import Source, read_source
 from ..formats.writers import env_text, robot_text
 from ..geometry.resolve import find_all
@@ -147,7 +147,7 @@ def _write_environment(
     companions = [Output(n, Kind.ROBOT, robot_text(m)) for n, m in zip(names, _apart(placed), strict=True)]
     if query is not None:
         dofs = robot_dofs(environment, DiagnosticLog())
-        alone = [own for task in environment.tasks for own in task.of_each(dofs)]
+        alone = [own for task in environment.tasks for own in tasks_alone(task, dofs)]
         rows = query_text(alone, index=begins_with_robot(environment))
         companions.append(Output(query, Kind.QUERY, rows))
     scene = Output(out, Kind.ENVIRONMENT, env_text(placed))

@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 from ..diagnostics import DiagnosticLog
 from ..errors import Diagnostic, robots_named
+from ..formats.rows import tasks_alone
 from ..model.environment import Boundary, Dialect, Environment, MultiBody, PlannerRules, Task
 from .robots import DofMap, translate_obstacles, translate_robot
 from .scene_parts import Losses, translated_boundary, translated_resolution
@@ -143,7 +144,7 @@ def _of_one_robot_each(environment: Environment, maps: Sequence[DofMap], losses:
         if len(task.robots) > 1:
             message = f"query files do not say that {robots_named(task.robots)} move together; each gets its own rows"
             losses.lost("ENV177", task.label or environment.name, message, span=task.span)
-        yield from task.of_each(dofs)
+        yield from tasks_alone(task, dofs)
 
 
 def _report_xml(environment: Environment, losses: Losses) -> None:

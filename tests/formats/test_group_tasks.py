@@ -9,6 +9,7 @@ from texts import E, Reader, codes, fault, place, write
 
 import env2mjcf
 from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.formats.rows import tasks_alone
 from env2mjcf.formats.source import read_source
 from env2mjcf.formats.xml import parse_xml
 from env2mjcf.limits import Limits
@@ -57,7 +58,7 @@ def test_the_robots_of_a_group_have_one_task(problem: Reader) -> None:
     assert [(t.robots, t.robot, t.label) for t in scene.tasks] == [((1, 0), 1, "go"), ((2,), 2, "wait")]
     assert scene.tasks[0].configurations == ((4, 5, 6, 1, 2), (7, 8, 0.5, 3, 4))
     assert not codes(scene)
-    alone = list(scene.tasks[0].of_each([2, 3, 2]))
+    alone = list(tasks_alone(scene.tasks[0], [2, 3, 2]))
     assert [(t.robots, t.configurations) for t in alone] == [((1,), ((4, 5, 6), (7, 8, 0.5))), ((0,), ((1, 2), (3, 4)))]
 
 
