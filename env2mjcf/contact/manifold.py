@@ -80,7 +80,8 @@ class Manifolds:
         pose = poses[pair.link][0]
         convex = overlap(surfaces, job, 0)
         if convex is not None:
-            if convex.depth <= self._band:
+            solid = surfaces.surface(int(job.a[0])).solid or surfaces.surface(int(job.b[0])).solid
+            if convex.depth <= self._band or not solid:
                 points = nearest_points(surfaces, job, touch)
                 if points.distance[0] > touch and not surfaces.contained(job)[0]:
                     return [_apart(points, pose)]

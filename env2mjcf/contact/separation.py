@@ -47,10 +47,10 @@ def separations(surfaces: Surfaces, jobs: Jobs, touch: float) -> tuple[Floats, F
     Others are pushed until no triangles cross and none is inside the other. First come the shortest pushes that take
     each pair of touching triangles apart, off the plane of one of them or square to an edge of each: one, two or three
     of these planes decide. What is met then is added, a few times. Where a body is pressed a little into flat walls, a
-    corner or a notch, by eight planes at the most, that is the shortest push there is. After that come directions that
+    corner or a notch, eight planes at the most, that is the shortest push there is. After that come directions that
     would part their hulls soonest: of normals of triangles that touch, of lines square to two of these, along which a
-    tunnel leads out, of 26 even directions, and the line between the middles. So a deep overlap of bodies that are not
-    convex may be called deeper than it is.
+    tunnel leads out, of 26 even directions, and the line between the middles. Beyond shallow contact, all that is
+    certain is that the push separates: bodies that are not convex may be called deeper than they are.
 
     Args:
         surfaces: Of all bodies.
