@@ -171,6 +171,9 @@ CATALOGUE: dict[str, str] = {
     "GEO250": "The inertia of a body was not computed from its volume alone.",
     "GEO251": "A scene is so large or small that its unit is hardly the metre.",
     "GEO252": "A body lies too far from the origin to be computed with.",
+    "GEO253": "The bodies are far from the file's origin; the MJCF has one amid them.",
+    "GEO254": "Bodies, or the vertices of a mesh, are so far from their origin that rounding would decide verdicts.",
+    "GEO255": "A mesh is in single precision and far from its origin, so that its numbers are coarse.",
     "GEO260": "An entry of the geometry cache was damaged and has been made anew.",
     "GEO261": "The geometry cache cannot be read or written; everything is computed.",
     "GEO262": "CoACD crashed, hung, or gave no parts.",
@@ -190,6 +193,7 @@ CATALOGUE: dict[str, str] = {
     "KIN311": "A closed loop is open at home; its equality is written, but inactive.",
     "KIN312": "Two bodies touch at home.",
     "KIN313": "Pairs that touch at home are not tested, as was asked for.",
+    "KIN314": "A robot that travels is at home far from all else; its place does not count in the extent.",
     "KIN320": "An SMAJoint cannot be converted.",
     # What is written for MuJoCo.
     "MJC401": "MuJoCo refuses a model.",

@@ -60,6 +60,7 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     yield _facts(
         [
             ("extent", f"{report.extent:.6g} m"),
+            ("origin", f"of the MJCF: {' '.join(f'{x:.15g}' for x in report.origin)} m in the file's frame"),
             ("mass", f"{report.mass:.6g} kg, all links"),
             ("geoms", f"{report.geoms} that collide"),
             ("pairs", f"{report.pairs} tested"),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,13 @@ class Outside:
 
 
 Reason: TypeAlias = Contact | BrokenLimit | Outside
+
+_Somewhere = TypeVar("_Somewhere", Contact, Outside)
+
+
+def moved(found: Sequence[_Somewhere], by: tuple[float, float, float]) -> list[_Somewhere]:
+    """Return contacts, or what is outside, with their positions moved by a vector of the world."""
+    return [replace(f, position=f.position + by) if any(by) else f for f in found]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from ..contact.edges import even_rows
 from ..contact.queries import ContactQueries, joined
 from ..contact.tasks import Question
 from ..contact.threads import ask, thread_count
-from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
+from ..contact.types import Contact, OneRow, Outside, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
 from ..model.environment import Environment
@@ -28,7 +28,7 @@ from ..options import Engine
 from ..pipeline import Compiled
 from ..report import Report, report
 from ..system.locks import Lock
-from ..transforms import Array, real_array
+from ..transforms import Array, real_array, translated
 from .mujoco_model import load_spec
 
 _ENGINES = get_args(Engine)
@@ -124,6 +124,11 @@ class Scene:
         return self._compiled.assembly.extent
 
     @property
+    def origin(self) -> Array:
+        """Where the origin of `model` and `data` lies in the file's frame, which q and poses are in: (3,), metres."""
+        return np.array(self._compiled.assembly.origin)
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """All robot bodies, in file order."""
         return tuple(p.name for p in self._solver.links)
@@ -195,7 +200,8 @@ class Scene:
 
     def obstacle_poses(self) -> Array:
         """Return the world poses of all obstacles, (m, 4, 4)."""
-        return np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
+        poses = np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
+        return translated(poses, self._compiled.assembly.origin)
 
     def loop_error(self, q: ArrayLike) -> float | Array:
         """Return how far the worst loop is from closed, in metres: a float, or (n,) floats; 0.0 without loops.
@@ -368,6 +374,14 @@ class Scene:
         if placed.shape != (len(self._solver.links), 4, 4):
             raise ValueError(f"poses of shape {placed.shape}; expected ({len(self._solver.links)}, 4, 4)")
         return self._solver.contacts_of_poses(placed)
+
+    def inside(self, poses: Array) -> Bools:
+        """Return whether links at poses (n, nlinks, 4, 4), known to be finite, are inside the boundary, (n,)."""
+        return self._solver.inside(poses)
+
+    def outside_of_poses(self, poses: Array) -> list[Outside]:
+        """Return the links at poses (nlinks, 4, 4), known to be finite, that reach beyond the boundary."""
+        return self._solver.outside_of_poses(poses)
 
     def packed_contacts(
         self,

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.containment import BoundaryTest
 from ..contact.types import Contact, Reason, Verdict, deepest
 from ..options import whole
 from ..transforms import Array
@@ -41,8 +40,6 @@ class Verdicts:
     ) -> None:
         self._scene, self._q, self.labels = scene, q, labels
         self._placed = np.zeros(len(q), dtype=bool) if fits is None or poses is None else ~fits
-        assembly = scene.compiled.assembly
-        self._boundary = BoundaryTest(assembly.environment.boundary, assembly.links)
         self.in_limits = scene.space.within_limits(q)
         self.in_collision = np.asarray(scene.in_collision(q, progress=True))
         self._poses = scene.link_poses(q)
@@ -50,7 +47,7 @@ class Verdicts:
             self._poses[self._placed] = poses[self._placed]
             self.in_limits[self._placed] = True
             self.in_collision[self._placed] = [bool(scene.contacts_of_poses(p)) for p in poses[self._placed]]
-        self.inside = self._boundary.inside(self._poses)
+        self.inside = scene.inside(self._poses)
         self.valid = self.in_limits & self.inside & ~self.in_collision
 
     def verdict(self, index: int) -> Verdict:
@@ -59,7 +56,7 @@ class Verdicts:
         if self.valid[index]:
             return Verdict(q, ())
         if self._placed[index]:
-            return Verdict(q, (*deepest(self._scene.contacts_of_poses(poses)), *self._boundary.outside(poses)))
+            return Verdict(q, (*deepest(self._scene.contacts_of_poses(poses)), *self._scene.outside_of_poses(poses)))
         return self._scene.explain(q)
 
 
