@@ -22,7 +22,7 @@ from .containment import BoundaryTest, Containment
 from .edges import EdgeSteps, MotionBounds, certified, even_rows
 from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
-from .mujoco_engine import MujocoEngine, static_contacts
+from .mujoco_engine import MujocoEngine
 from .surfaces import Surfaces
 from .types import BrokenLimit, Contact, Outside, PackedContacts, Reason, Verdict, deepest, moved
 
@@ -47,7 +47,7 @@ class ContactQueries:
         self._pairs = compiled.pairs.tested
         self._pair_of = {frozenset((p.link, p.other)): i for i, p in enumerate(self._pairs)}
         self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
-        self._engine = MujocoEngine(model, document.owners)
+        self._engine = MujocoEngine(model, document.owners, assembly.extent)
         self._bodies = np.array([model.body(p.name).id for p in self.links], dtype=np.int64)
         self._boundary = BoundaryTest(assembly)
         self._obstacle_poses = {p.name: p.mesh_pose for p in assembly.obstacles}
@@ -65,9 +65,7 @@ class ContactQueries:
         self.steps = EdgeSteps(assembly, self._space)
         self._motion = MotionBounds(assembly, self._space, between_links)
         if static is None:
-            data = mujoco.MjData(model)
-            mujoco.mj_kinematics(model, data)
-            static = static_contacts(model, data, self._pairs, document.owners)
+            static = self._engine.static_contacts(self._pairs)
         self._static = static
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -19,6 +19,7 @@ from .analysis import Analysis
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .mesh import Mesh, load_mesh
+from .pieces import LEAST_AREA
 from .placement import AtHome, Placed, Point, bounding_box, local_origin, report_frame
 from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
@@ -225,6 +226,10 @@ class _Meshes:
             self._analyses[mesh] = result.analysis, work
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis, work = self._analyses[mesh]
+        if 0 < analysis.area < LEAST_AREA:
+            message = f"its area of {analysis.area:.3g} m^2 is below {LEAST_AREA:g}, the least that MuJoCo takes of a mesh"
+            hint = "enlarge the scene with scale= (--scale)"
+            self._log.fail("GEO241", body.filename, message, hint=hint, span=body.span)
         shape = proof = None
         if thickness is not None:
             if mesh not in self._shapes:

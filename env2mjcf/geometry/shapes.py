@@ -17,7 +17,7 @@ from .convexity import is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
-from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
+from .pieces import LEAST_AREA, ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
@@ -40,6 +40,7 @@ class CollisionShape:
         analysis: The mesh's analysis.
         note: One sentence for the report.
         omitted_area: Area of polygons that are too small for MuJoCo.
+        omitted_length: Greatest length of one of them.
     """
 
     mesh: Mesh
@@ -49,6 +50,7 @@ class CollisionShape:
     analysis: Analysis
     note: str
     omitted_area: float = 0.0
+    omitted_length: float = 0.0
 
 
 def collision_shape(
@@ -105,9 +107,13 @@ def collision_shape(
         hint = "close the mesh, or give it a wall thickness, if its inside matters"
         log.info("GEO243", subject, shape.note, hint=hint, span=span)
     if shape.omitted_area:
-        message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
-        hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
-        report = log.warn if shape.pieces else log.fail
+        message = (
+            f"polygons of area {shape.omitted_area:.3g} m^2 in all, up to {shape.omitted_length:.3g} m long, are too "
+            f"small for MuJoCo, whose least area of a mesh is {LEAST_AREA:g} m^2, and do not collide"
+        )
+        hint = "enlarge the scene with scale= (--scale)"
+        # A hole that is no longer than verdicts may be off changes none of those that are certain.
+        report = log.warn if shape.pieces and shape.omitted_length <= 2 * thickness else log.fail
         report("GEO241", subject, message, hint=hint, span=span)
     return shape
 
@@ -135,15 +141,18 @@ def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Co
     polygons = convex_polygons(analysis.vertices, faces, analysis.tolerance)
     pieces = prisms(analysis.vertices, polygons, thickness, inward=analysis.solid)
     made = {id(piece.polygon) for piece in pieces}
-    omitted = _area(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made])
+    omitted = _omitted(analysis, np.arange(len(faces)), [p for p in polygons if id(p) not in made])
     note = f"{counted(len(faces), 'triangle')} in {counted(len(pieces), 'prism')}"
-    return CollisionShape(mesh, "surface", pieces, False, analysis, note, omitted)
+    return CollisionShape(mesh, "surface", pieces, False, analysis, note, *omitted)
 
 
-def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float:
-    """Return the area of polygons whose faces are rows of `faces`."""
+def _omitted(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> tuple[float, float]:
+    """Return the area of polygons whose faces are rows of `faces`, and the greatest length of one."""
     lost = [face for polygon in polygons for face in polygon.faces]
-    return float(face_areas(analysis.vertices, analysis.faces[faces[lost]]).sum()) if lost else 0.0
+    if not lost:
+        return 0.0, 0.0
+    lengths = [np.linalg.norm(np.ptp(analysis.vertices[list(p.loop)], axis=0)) for p in polygons]
+    return float(face_areas(analysis.vertices, analysis.faces[faces[lost]]).sum()), float(max(lengths))
 
 
 def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
@@ -168,8 +177,8 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
     lining = shells(analysis, rest, thickness, work)
     note = _shell_note(lining, analysis.component_volumes[~whole].sum())
     note = f"{_hulled(hulls)}, {note}" if hulls else note
-    omitted = _area(analysis, rest, lining.missing)
-    return CollisionShape(mesh, "solid", hulls + lining.pieces, True, analysis, note, omitted)
+    omitted = _omitted(analysis, rest, lining.missing)
+    return CollisionShape(mesh, "solid", hulls + lining.pieces, True, analysis, note, *omitted)
 
 
 def _shell_note(lining: Shells, volume: float) -> str:

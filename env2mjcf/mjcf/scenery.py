@@ -61,6 +61,9 @@ def add_settings(root: Element, assembly: Assembly, options: Options) -> None:
         ],
     )
     option = add(root, "option", timestep=number(step), gravity=numbers(gravity), integrator="implicitfast")
+    if assembly.extent < 1:
+        # MuJoCo's is absolute: a millionth of a metre, which is here one of the extent.
+        option.set("ccd_tolerance", number(float(f"{1e-6 * assembly.extent:.0e}")))
     add(option, "flag", filterparent="disable")
     center = (assembly.lower + assembly.upper) / 2
     add(root, "statistic", center=numbers(center), extent=number(assembly.extent))
