@@ -15,7 +15,6 @@ from ..pairs import Pair
 from ..transforms import Array
 from .types import Contact, deepest
 
-
 # Extents in metres between which MuJoCo's tolerances, which are absolute, are small enough, and large enough; and one
 # that is well between them.
 _SMALLEST, _LARGEST, _CHOSEN = 1.0, 1e3, 16.0

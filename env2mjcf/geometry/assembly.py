@@ -227,7 +227,7 @@ class _Meshes:
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis, work = self._analyses[mesh]
         if 0 < analysis.area < LEAST_AREA:
-            message = f"its area of {analysis.area:.3g} m^2 is below {LEAST_AREA:g}, the least that MuJoCo takes of a mesh"
+            message = f"its area of {analysis.area:.3g} m^2 is below {LEAST_AREA:g}, the least of a mesh in MuJoCo"
             hint = "enlarge the scene with scale= (--scale)"
             self._log.fail("GEO241", body.filename, message, hint=hint, span=body.span)
         shape = proof = None

@@ -93,7 +93,7 @@ def test_the_tolerance_of_the_written_scene_follows_its_extent(peg: Path) -> Non
 
 def test_powers_of_two_change_no_digit(peg: Path) -> None:
     rng = np.random.default_rng(1)
-    q = rng.uniform(-1, 1, (200, 6)) * (0.15, 0.15, 0.6, 0.1, 0.1, 0.1)
+    q = rng.uniform(-1, 1, (20, 6)) * (0.15, 0.15, 0.6, 0.1, 0.1, 0.1)
     usual, small = (env2mjcf.load(peg, scale=s, cache=False, engine="mujoco") for s in (1.0, 2.0**-17))
     scaled = q * (*[2.0**-17] * 3, 1, 1, 1)
     assert (small.clearance(scaled) == usual.clearance(q) * 2.0**-17).all()
@@ -129,7 +129,7 @@ def test_fixed_bodies_of_tiny_scenes_touch_where_they_do(tmp_path: Path) -> None
 
 
 def test_what_mujoco_cannot_hold_is_refused_with_the_figure(peg: Path) -> None:
-    with pytest.raises(env2mjcf.GeometryError, match=r"GEO241: its area of 4.5e-16 m\^2 is below 2e-14"):
+    with pytest.raises(env2mjcf.GeometryError, match=r"GEO241: its area of 4.05e-16 m\^2 is below 2e-14"):
         env2mjcf.load(peg, scale=1e-8, cache=False)
 
 
@@ -142,11 +142,7 @@ def test_real_scenes_have_the_same_verdicts_at_every_scale(corpus: Path, name: s
     clearance = usual.clearance(q)
     certain = np.abs(clearance) > 2e-5 * usual.extent
     for scale in (1e-5, 1e-3, 1e3, 1e6):
-        try:
-            scene = env2mjcf.load(real.env, scale=scale, **real.keywords)
-        except env2mjcf.GeometryError as error:
-            assert error.code == "GEO241"
-            continue
+        scene = env2mjcf.load(real.env, scale=scale, **real.keywords)
         rows = scene.space.decode(usual.space.encode(q))
         for engine in ("mujoco", None):
             wrong = scene.in_collision(rows, engine=engine) != (clearance <= 0)

@@ -192,7 +192,7 @@ def test_pieces_too_small_for_mujoco_are_reported() -> None:
     assert shape.omitted_area == pytest.approx((1.5 + np.sqrt(3) / 2) * 9e-16, rel=1e-6)
     assert compiled(shape.pieces).nmesh == 14
     # What is longer than verdicts may be off would leave a hole in them.
-    with pytest.raises(GeometryError, match="up to 5.2e-08 m long"):
+    with pytest.raises(GeometryError, match=r"up to 5\.2e-08 m long"):
         collision_shape(speck, analyse(speck), "surface", 2e-8, DiagnosticLog())
 
 

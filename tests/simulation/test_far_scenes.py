@@ -40,7 +40,7 @@ def numbers(values: np.ndarray) -> str:
 def dialect_a(folder: Path, at: np.ndarray) -> Path:
     """The robot stands above the hall."""
     text = (
-        f"2\nMultiBody Active\n1\nFreeBody 0 cube.g {numbers(at + (0, 0, 6))} 0 0 0\nConnection\n0\n"
+        f"2\nMultiBody Active\n1\nFreeBody 0 cube.g {numbers(np.add(at, (0, 0, 6)))} 0 0 0\nConnection\n0\n"
         f"MultiBody Passive\n1\nFixedBody 0 hall.g {numbers(at)} 0 0 0\nConnection\n0\n"
     )
     return write_scene(folder, text, hall=hall(np.zeros(3)))
@@ -56,7 +56,7 @@ def dialect_d(folder: Path, at: np.ndarray) -> Path:
         f"Passive\nhall.g {numbers(at)} 0 0 30\n"
     )
     path = write_scene(folder, text, hall=hall(np.zeros(3)), arm=box_mesh(0.5, 0.1, 0.1))
-    rows = [numbers(np.r_[at + (0.3, 0.2, z), 0, 0, 0, 0.1]) for z in (6, 8)]
+    rows = [numbers(np.r_[np.add(at, (0.3, 0.2, z)), 0, 0, 0, 0.1]) for z in (6, 8)]
     (folder / "scene.query").write_text("\n".join(rows) + "\n")
     return path
 
@@ -170,10 +170,10 @@ def test_plain_mujoco_agrees_on_the_written_scene(pair: tuple[str, Scene, Scene]
 def test_a_cube_comes_to_rest_on_the_roof(tmp_path: Path) -> None:
     scene = loaded("A", tmp_path / "far", FAR)
     # Above the middle of the slab that the hall is: 2 m high, and half of the cube.
-    scene.set(np.r_[FAR + (-3, -3, 2.6), 0, 0, 0])
+    scene.set(np.r_[np.add(FAR, (-3, -3, 2.6)), 0, 0, 0])
     for _ in range(1500):
         mujoco.mj_step(scene.model, scene.data)
-    assert scene.q()[:3] == pytest.approx(FAR + (-3, -3, 2.5), abs=1e-3)
+    assert scene.q()[:3] == pytest.approx(np.add(FAR, (-3, -3, 2.5)), abs=1e-3)
 
 
 def test_public_poses_are_in_the_frame_of_the_file(pair: tuple[str, Scene, Scene]) -> None:
@@ -190,7 +190,7 @@ def test_public_poses_are_in_the_frame_of_the_file(pair: tuple[str, Scene, Scene
         near.space.from_qpos(near.space.qpos(here)) + np.r_[FAR, np.zeros(far.space.dim - 3)], abs=4e-9
     )
     assert np.abs(far.space.qpos(there)).max() < 100
-    assert (far.space.home[:3] == (FAR + (0, 0, 6) if kind == "A" else 0)).all()
+    assert (far.space.home[:3] == (np.add(FAR, (0, 0, 6)) if kind == "A" else 0)).all()
     key = far.model.key("home").qpos
     assert key == pytest.approx(far.space.qpos(far.space.home), abs=1e-9)
     assert far.q()[:3] == pytest.approx(far.space.home[:3], abs=4e-9)
@@ -224,7 +224,7 @@ def test_samples_lie_about_the_scene(pair: tuple[str, Scene, Scene]) -> None:
 def test_the_keys_of_a_query_are_near_the_origin(tmp_path: Path) -> None:
     scene = loaded("D", tmp_path / "far", FAR)
     query = scene.queries[0].q
-    assert query[0, :3] == pytest.approx(FAR + (0.3, 0.2, 6))
+    assert query[0, :3] == pytest.approx(np.add(FAR, (0.3, 0.2, 6)))
     assert scene.model.key("start").qpos == pytest.approx(scene.space.qpos(query[0]))
     assert np.abs(scene.model.key("start").qpos).max() < 20
     assert scene.is_valid(query).all()
@@ -258,14 +258,15 @@ def test_the_origin_may_be_named_or_left_where_it_is(tmp_path: Path) -> None:
 def test_millimetres_of_a_map_are_moved_as_metres_are(tmp_path: Path) -> None:
     path = write_scene(
         tmp_path,
-        "Boundary Box [-1e12:1e12 ; -1e12:1e12 ; -1e12:1e12]\nMultibodies\n2\nActive\n1\ncube.g Volumetric Rotational\nConnections\n0\n"
+        "Boundary Box [-1e12:1e12 ; -1e12:1e12 ; -1e12:1e12]\nMultibodies\n2\nActive\n1\n"
+        "cube.g Volumetric Rotational\nConnections\n0\n"
         f"Passive\nhall.g {numbers(FAR * 1000)} 0 0 0\n",
         hall=hall(np.zeros(3)),
     )
     scene = env2mjcf.load(path, scale=1e-3, cache=False, dialect="D")
     assert np.abs(scene.origin - FAR).max() <= 1
     assert scene.extent < 0.1
-    q = np.r_[FAR + (0, 0, 0.0026), 0, 0, 0]
+    q = np.r_[np.add(FAR, (0, 0, 0.0026)), 0, 0, 0]
     assert scene.clearance(q) == pytest.approx(1e-4, abs=2e-9)
     assert not scene.in_collision(q, engine="mujoco")
     assert scene.in_collision(q - np.r_[0, 0, 2e-4, 0, 0, 0], engine="mujoco")
@@ -288,7 +289,8 @@ def test_a_fixed_robot_counts_by_its_place(tmp_path: Path) -> None:
     scene = env2mjcf.load(
         write_scene(
             tmp_path,
-            "Boundary Box [-10:10 ; -10:10 ; -10:10]\nMultibodies\n2\nActive\n2\ncube.g Fixed 0 0 0 0 0 0\ncube.g Joint\n"
+            "Boundary Box [-10:10 ; -10:10 ; -10:10]\nMultibodies\n2\nActive\n2\n"
+            "cube.g Fixed 0 0 0 0 0 0\ncube.g Joint\n"
             "Connections\n1\n0 1 Revolute -1:1\n0 0 1 0 0 0  0 0 0 0  1 0 0 0 0 0\n"
             f"Passive\ncube.g {numbers(FAR)} 0 0 0\n",
         ),
