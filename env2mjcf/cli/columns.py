@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ..contact.types import short
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
 from .terminal import one_line
@@ -101,8 +102,8 @@ def _robot(number: int, robot: RobotSummary) -> Iterator[RenderableType]:
         return
     table = _table("", "unit", "limits in file", "home", "limits in rad, m", "home", right=(3, 5))
     for dof in robot.dofs:
-        of_file = _limits(dof, dof.lower, dof.upper), f"{dof.home:.6g}"
-        in_si = _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"
+        of_file = _limits(dof, dof.lower, dof.upper), short(dof.home)
+        in_si = _limits(dof, dof.lower_si, dof.upper_si), short(dof.home_si)
         table.add_row(*_cells(dof.name, _UNITS[dof.unit], *of_file, *in_si))
     yield _indented(table)
 
@@ -112,7 +113,7 @@ def _limits(dof: DofSummary, lower: float, upper: float) -> str:
         return "turns freely"
     if math.isinf(lower) and math.isinf(upper):
         return "none"
-    return f"{lower:.6g} to {upper:.6g}"
+    return f"{short(lower)} to {short(upper)}"
 
 
 def _semantics(scene: SceneSummary) -> str:
@@ -130,9 +131,9 @@ def _boundary(boundary: Boundary | None) -> str:
         return "none"
     if boundary.lower:
         sides = zip("xyz", boundary.lower, boundary.upper, strict=False)
-        inside = ", ".join(f"{axis} {low:g} to {high:g}" for axis, low, high in sides)
+        inside = ", ".join(f"{axis} {short(low)} to {short(high)}" for axis, low, high in sides)
     else:
-        inside = f"radius {boundary.radius:g} around {' '.join(f'{c:g}' for c in boundary.center)}"
+        inside = f"radius {boundary.radius:g} around {' '.join(map(short, boundary.center))}"
     return f"{boundary.shape.value}, {inside}, file units"
 
 

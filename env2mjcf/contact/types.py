@@ -69,7 +69,7 @@ class BrokenLimit:
     upper: float
 
     def __str__(self) -> str:
-        return f"{self.name} is {self.value:.6g}; limits {self.lower:.6g} to {self.upper:.6g}"
+        return f"{self.name} is {short(self.value)}; limits {short(self.lower)} to {short(self.upper)}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,5 +192,10 @@ class PathReport:
     contacts: tuple[Contact, ...]
 
 
+def short(value: float) -> str:
+    """Return a number with six digits, or more if the first ones say where on a map it is."""
+    return f"{value:.6g}" if abs(value) < 1e5 or abs(value) > 1e9 else f"{value:.11g}"
+
+
 def _numbers(position: NDArray[np.float64]) -> str:
-    return ", ".join(f"{x:.6g}" for x in position)
+    return ", ".join(map(short, position.tolist()))

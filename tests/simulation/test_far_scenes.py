@@ -379,3 +379,75 @@ def test_a_mesh_in_single_precision_far_away_is_reported(tmp_path: Path) -> None
     found = [d for d in env2mjcf.load(path, cache=False).diagnostics if d.code == "GEO255"]
     assert len(found) == 1
     assert "0.5 m apart" in found[0].message
+
+
+def test_paths_queries_and_recorded_poses_keep_the_frame_of_the_file(
+    pair: tuple[str, Scene, Scene], tmp_path: Path
+) -> None:
+    kind, _, far = pair
+    q = rows(far, 12, FAR)
+    assert env2mjcf.read_path(far, env2mjcf.write_path(far, q, tmp_path / "a.path")).q == pytest.approx(q, abs=2e-9)
+    if kind != "A":
+        return
+    # As dialect A's planner printed them: six decimals, angles about fixed axes in turns.
+    lines = ["VIZMO_PATH_FILE   Path Version 2001125", "1", str(len(q))]
+    lines += [" ".join(f"{x:.6f}" for x in (*row[:3], *row[3:] / 6.2832)) for row in q]
+    (tmp_path / "b.path").write_text("\n".join(lines) + "\n")
+    found = env2mjcf.read_path(far, tmp_path / "b.path")
+    assert found.fits.all()
+    assert far.link_poses(found.q) == pytest.approx(far.link_poses(q), abs=1e-4)
+
+
+def test_batches_answer_as_the_scene_does(pair: tuple[str, Scene, Scene], tmp_path: Path) -> None:
+    _, near, far = pair
+    np.save(tmp_path / "q.npy", rows(far, 50, FAR))
+    env2mjcf.batch.run(far, tmp_path / "q.npy", tmp_path / "out.npy", "clearance")
+    expected = near.clearance(rows(near, 50, np.zeros(3)))
+    assert np.load(tmp_path / "out.npy") == pytest.approx(expected, abs=1e-9 * near.extent)
+
+
+@needs("fast")
+def test_plans_are_found_about_the_scene(tmp_path: Path) -> None:
+    scene = loaded("D", tmp_path / "far", FAR)
+    q = scene.queries[0].q
+    plan = env2mjcf.planning.plan(scene, q[0], q[1])
+    assert plan.solved
+    assert plan.certified.all()
+    env2mjcf.testing.assert_valid_path(scene, plan.path)
+    wrong = q[0] - np.r_[0, 0, 6, np.zeros(4)]
+    with pytest.raises(AssertionError, match=r"at \(5123\d\d\.\d+, 54032\d\d\.\d+, 31\d"):
+        env2mjcf.testing.assert_free(scene, wrong)
+
+
+def test_translations_stand_where_the_file_says(tmp_path: Path) -> None:
+    path = dialect_d(tmp_path / "far", FAR)
+    for dialect in ("B", "C"):
+        translated = env2mjcf.translate(env2mjcf.read(path), dialect)
+        env2mjcf.write_environment(translated.environment, path.with_name(f"{dialect}.env"))
+        there, source = (env2mjcf.load(p, cache=False) for p in (path.with_name(f"{dialect}.env"), path))
+        q = rows(source, 30, FAR)
+        assert there.origin.tolist() == source.origin.tolist()
+        assert there.clearance(q) == pytest.approx(source.clearance(q), abs=1e-8)
+
+
+@pytest.mark.parametrize("ground", [False, True])
+def test_the_ground_lies_below_every_key(tmp_path: Path, ground: bool) -> None:
+    scene = loaded("D", tmp_path / "far", FAR, ground=ground)
+    planes = np.flatnonzero(scene.model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    assert len(planes) == ground
+    for plane in planes:
+        assert scene.model.geom_pos[plane, 2] < scene.space.qpos(scene.space.home)[2] - 0.5
+
+
+@needs("view")
+@pytest.mark.slow
+def test_pictures_show_what_the_same_scene_at_the_origin_shows(pair: tuple[str, Scene, Scene]) -> None:
+    _, near, far = pair
+    here, there = (np.r_[np.add(at, (-2, -2, 3)), np.zeros(near.space.dim - 3)] for at in (np.zeros(3), FAR))
+    camera = env2mjcf.view.Direction(1.0, -0.8)
+    pictures = [
+        env2mjcf.view.picture(scene, q, size=(160, 120), camera=camera) for scene, q in ((near, here), (far, there))
+    ]
+    apart = np.abs(pictures[0].astype(float) - pictures[1]).max(axis=-1)
+    assert (apart > 40).mean() < 0.02
+    assert np.ptp(pictures[1]) > 50
