@@ -164,7 +164,7 @@ CATALOGUE: dict[str, str] = {
     "GEO238": "Vertices of a mesh are used by no face.",
     "GEO239": "Edges of a mesh have more than two faces.",
     "GEO240": "A mesh that is not convex collides as its convex hull, by choice.",
-    "GEO241": "Polygons of a mesh are too small for MuJoCo and do not collide.",
+    "GEO241": "A mesh, or some of its polygons, are too small for MuJoCo and do not collide.",
     "GEO242": "Vertices lay on edges of other faces (T-junctions); those faces were cut there.",
     "GEO243": "A mesh without inside collides as a surface, though it was to be solid.",
     "GEO244": "Flat parts of a closed mesh were folded over themselves; they were triangulated anew.",

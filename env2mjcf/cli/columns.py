@@ -61,13 +61,17 @@ def geometry_part(report: Report) -> Iterator[RenderableType]:
     yield _facts(
         [
             ("extent", f"{report.extent:.6g} m"),
-            ("origin", f"of the MJCF: {' '.join(f'{x:.15g}' for x in report.origin)} m in the file's frame"),
+            *_origin(report.origin),
             ("mass", f"{report.mass:.6g} kg, all links"),
             ("geoms", f"{report.geoms} that collide"),
             ("pairs", f"{report.pairs} tested"),
             ("certain", f"beyond {report.band:.2g} m of contact"),
         ]
     )
+
+
+def _origin(origin: tuple[float, float, float]) -> list[tuple[str, str]]:
+    return [("origin", f"of the MJCF: {' '.join(map(short, origin))} m in the file's frame")] if any(origin) else []
 
 
 def pairs_part(counts: Sequence[PairCount], samples: int) -> Iterator[RenderableType]:

@@ -24,7 +24,7 @@ from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
 from .mujoco_engine import MujocoEngine
 from .surfaces import Surfaces
-from .types import BrokenLimit, Contact, Outside, PackedContacts, Reason, Verdict, deepest, moved
+from .types import BrokenLimit, Contact, PackedContacts, Reason, Verdict, deepest, moved
 
 # Configurations of edges that are made at once.
 _BLOCK = 10_000
@@ -271,25 +271,13 @@ class ContactQueries:
 
     def contacts_of_poses(self, poses: Array) -> list[Contact]:
         """Return the contacts of links that stand anywhere, (nlinks, 4, 4), found on triangles."""
-        by_name = self._named(self._local(poses)[None])
+        by_name = self._named(translated(poses, -np.array(self._assembly.origin))[None])
         if self._triangles.clearance.signed(by_name, 1)[0] > 0:
             return []
         inside = self._containment.pairs_inside(by_name) if self._containment.needed else []
         pairs = {*self._triangles.clearance.nearest_pairs(by_name), *(index for index, _ in inside)}
         found = [c for c in self._triangles.manifolds.contacts({}, pairs, by_name) if c.distance <= 0]
         return moved(found, self._assembly.origin)
-
-    def outside_of_poses(self, poses: Array) -> list[Outside]:
-        """Return the links that reach beyond the boundary where they stand anywhere, (nlinks, 4, 4)."""
-        return moved(self._boundary.outside(self._local(poses)), self._assembly.origin)
-
-    def inside(self, poses: Array) -> NDArray[np.bool_]:
-        """Return whether links that stand anywhere, (n, nlinks, 4, 4), are inside the boundary, (n,)."""
-        return self._boundary.inside(self._local(poses))
-
-    def _local(self, poses: Array) -> Array:
-        """Return poses in the file's frame about the scene's origin."""
-        return translated(poses, -np.array(self._assembly.origin))
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)

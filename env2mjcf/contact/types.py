@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..pairs import ContactKind
 
@@ -97,9 +97,10 @@ Reason: TypeAlias = Contact | BrokenLimit | Outside
 _Somewhere = TypeVar("_Somewhere", Contact, Outside)
 
 
-def moved(found: Sequence[_Somewhere], by: tuple[float, float, float]) -> list[_Somewhere]:
-    """Return contacts, or what is outside, with their positions moved by a vector of the world."""
-    return [replace(f, position=f.position + by) if any(by) else f for f in found]
+def moved(found: Sequence[_Somewhere], by: ArrayLike) -> list[_Somewhere]:
+    """Return contacts, or what is outside, with their positions moved by a vector of the world, (3,)."""
+    vector = np.asarray(by, dtype=np.float64)
+    return [replace(f, position=f.position + vector) for f in found] if vector.any() else list(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from ..contact.edges import even_rows
 from ..contact.queries import ContactQueries, joined
 from ..contact.tasks import Question
 from ..contact.threads import ask, thread_count
-from ..contact.types import Contact, OneRow, Outside, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
+from ..contact.types import Contact, OneRow, PackedContacts, PathReport, Reason, Rows, UnknownShape, Verdict
 from ..errors import Diagnostic
 from ..kinematics.space import ConfigurationSpace
 from ..model.environment import Environment
@@ -120,7 +120,10 @@ class Scene:
 
     @property
     def extent(self) -> float:
-        """Diagonal of the bounding box of all bodies at home, in metres: the unit of every tolerance."""
+        """Diagonal of the bounding box of all bodies at home, in metres: the unit of every tolerance.
+
+        A robot that travels and is at home far from all else counts by its size, not by its place.
+        """
         return self._compiled.assembly.extent
 
     @property
@@ -374,14 +377,6 @@ class Scene:
         if placed.shape != (len(self._solver.links), 4, 4):
             raise ValueError(f"poses of shape {placed.shape}; expected ({len(self._solver.links)}, 4, 4)")
         return self._solver.contacts_of_poses(placed)
-
-    def inside(self, poses: Array) -> Bools:
-        """Return whether links at poses (n, nlinks, 4, 4), known to be finite, are inside the boundary, (n,)."""
-        return self._solver.inside(poses)
-
-    def outside_of_poses(self, poses: Array) -> list[Outside]:
-        """Return the links at poses (nlinks, 4, 4), known to be finite, that reach beyond the boundary."""
-        return self._solver.outside_of_poses(poses)
 
     def packed_contacts(
         self,

@@ -129,7 +129,7 @@ def test_fixed_bodies_of_tiny_scenes_touch_where_they_do(tmp_path: Path) -> None
 
 
 def test_what_mujoco_cannot_hold_is_refused_with_the_figure(peg: Path) -> None:
-    with pytest.raises(env2mjcf.GeometryError, match=r"GEO241: its area of 4.05e-16 m\^2 is below 2e-14"):
+    with pytest.raises(env2mjcf.GeometryError, match=r"GEO241: its area of 4.5e-16 m\^2 is below 2e-14"):
         env2mjcf.load(peg, scale=1e-8, cache=False)
 
 

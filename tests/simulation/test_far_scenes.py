@@ -451,3 +451,54 @@ def test_pictures_show_what_the_same_scene_at_the_origin_shows(pair: tuple[str, 
     apart = np.abs(pictures[0].astype(float) - pictures[1]).max(axis=-1)
     assert (apart > 40).mean() < 0.02
     assert np.ptp(pictures[1]) > 50
+
+
+@pytest.mark.parametrize("primitives", [False, True])
+def test_the_model_is_that_of_the_same_scene_at_the_origin(tmp_path: Path, primitives: bool) -> None:
+    """Walls, boundary, actuators, ground, camera and keys, too: nothing is in two frames."""
+
+    def path(name: str, at: np.ndarray) -> Path:
+        sides = " ; ".join(f"{c - 20!r}:{c + 20!r}" for c in at.tolist())
+        place = numbers(at)
+        text = (
+            f"Boundary Box [{sides}]\nMultibodies\n4\nActive\n2\ncube.g Fixed {place} 10 20 30\narm.g Joint\n"
+            "Connections\n1\n0 1 Revolute -0.9:0.9\n0 0 1 0 0 0  0 0.5 0 0  0.5 0 0 0 0 0\n"
+            "Active\n1\ncube.g Volumetric Translational\nConnections\n0\n"
+            f"Passive\nhall.g {numbers(np.add(at, (9, 3, 1)))} 40 50 60\nSurface floor\ncube.g {place} 0 0 0\n"
+        )
+        return write_scene(tmp_path / name, text, hall=hall(np.zeros(3)), arm=box_mesh(0.5, 0.1, 0.1))
+
+    options = {"boundary": "solid", "actuators": "position", "primitives": primitives, "cache": False}
+    far = env2mjcf.load(path("far", FAR), **options)
+    near = env2mjcf.load(path("near", np.zeros(3)), origin=far.origin - FAR, **options)
+    assert far.origin == pytest.approx(FAR, abs=30)
+    for name in dir(far.model):
+        array = getattr(far.model, name)
+        # The robot that travels is at home at the origin of its file.
+        if isinstance(array, np.ndarray) and array.dtype.kind == "f" and not name.startswith("key_"):
+            assert array == pytest.approx(getattr(near.model, name), abs=2e-8, rel=1e-6), name
+    q = np.r_[0.3, 1, 2, 3.0]
+    key = far.space.qpos(q + np.r_[0, FAR])
+    assert key == pytest.approx(near.space.qpos(q), abs=2e-9)
+    assert far.model.key("home").qpos == pytest.approx(np.r_[0, -far.origin], abs=1e-9)
+
+
+def test_a_mesh_far_from_its_frame_turns_about_it(tmp_path: Path) -> None:
+    """Its coordinates are those of a map, and its pose turns the whole map."""
+    arm = np.array([512345.0, 0, 0])
+    robot = "1\ncube.g Volumetric Rotational\nConnections\n0\n"
+    scenes: list[Scene] = []
+    for name, at, place in (("far", arm, "0 0 0"), ("near", np.zeros(3), "0 512345 0")):
+        text = (
+            '<Environment><MultiBody type="passive"><Base filename="hall.g" comAdjustment="none" type="fixed" '
+            f'transform="{place} 0 0 90"/></MultiBody></Environment>'
+        )
+        path = write_scene(tmp_path / name, text, "scene.xml", hall=hall(at))
+        (path.parent / "c.robot").write_text(robot)
+        scenes.append(env2mjcf.load(path, robots=path.parent / "c.robot", cache=False))
+    far, near = scenes
+    assert far.origin.tolist() == near.origin.tolist() == [0, 512340, 0] or far.origin[1] == 512350
+    assert far.obstacle_poses()[0, :3, 3] == pytest.approx(0, abs=1e-9)
+    q = rows(near, 60, np.array([0, 512345.0, 0]))
+    assert far.clearance(q) == pytest.approx(near.clearance(q), abs=1e-8)
+    assert (far.in_collision(q, engine="mujoco") == near.in_collision(q)).all()
