@@ -39,12 +39,13 @@ class MujocoEngine:
         model: The scene's model.
         owners: Name of the body that each collision geom belongs to.
         extent: Of the scene, in metres.
+        own: Whether the model is that of another engine of the same scene.
 
     Attributes:
         model: The engine's own model; an engine made of it answers alike.
     """
 
-    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str], extent: float) -> None:
+    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str], extent: float, own: bool = False) -> None:
         names = list(dict.fromkeys(owners.values()))
         index = {n: i for i, n in enumerate(names)}
         self._names = names
@@ -61,8 +62,8 @@ class MujocoEngine:
         self.model.opt.ccd_tolerance = _CCD_TOLERANCE
         self._lengths = _lengths_of_qpos(model)
         self._size = 1.0 if _SMALLEST <= extent <= _LARGEST else 2.0 ** round(math.log2(_CHOSEN / extent))
-        # A model that an engine was made of before has its size already.
-        self._grow(self._size / 2.0 ** round(math.log2(model.stat.extent / extent)))
+        if not own:
+            self._grow(self._size)
 
     def _grow(self, factor: float) -> None:
         """Make the model larger; powers of two change no digit of any number."""
@@ -71,7 +72,6 @@ class MujocoEngine:
         for name in _LENGTHS:
             getattr(self.model, name)[:] *= factor
         self.model.qpos0[self._lengths] *= factor
-        self.model.stat.extent *= factor
 
     def _place(self, row: Array, data: mujoco.MjData) -> None:
         """Put the bodies of `data` at qpos, in metres."""

@@ -47,7 +47,7 @@ class ContactQueries:
         self._pairs = compiled.pairs.tested
         self._pair_of = {frozenset((p.link, p.other)): i for i, p in enumerate(self._pairs)}
         self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
-        self._engine = MujocoEngine(model, document.owners, assembly.extent)
+        self._engine = MujocoEngine(model, document.owners, assembly.extent, own=static is not None)
         self._bodies = np.array([model.body(p.name).id for p in self.links], dtype=np.int64)
         self._boundary = BoundaryTest(assembly)
         self._obstacle_poses = {p.name: p.mesh_pose for p in assembly.obstacles}
