@@ -247,7 +247,7 @@ def test_the_origin_may_be_named_or_left_where_it_is(tmp_path: Path) -> None:
     assert left.origin.tolist() == [0, 0, 0]
     assert named.origin.tolist() == [512000, 5403000, 300]
     assert "GEO253" not in {d.code for d in (*left.diagnostics, *named.diagnostics)}
-    q = rows(left, 100, FAR)
+    q = rows(left, 40, FAR)
     assert left.extent == pytest.approx(named.extent, rel=1e-8)
     assert left.clearance(q) == pytest.approx(named.clearance(q), abs=1e-8)
     for scene in (left, named):
