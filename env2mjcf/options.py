@@ -53,6 +53,8 @@ class Options:
             times `scale`, else (0, 0, -9.81).
         ground: Add a ground plane below the scene.
         scale: Metres per file unit, applied to every length.
+        origin: Where the MJCF's origin lies, metres in the file's frame; unless given, a round point amid the bodies
+            where they are more than a thousand extents from the file's origin, else (0, 0, 0), which keeps its frame.
         engine: Which engine answers queries.
         cache: Keep the results of expensive geometry between runs.
         limits: Bounds on hostile input.
@@ -78,6 +80,7 @@ class Options:
     gravity: tuple[float, float, float] | None = None
     ground: bool = False
     scale: float = 1.0
+    origin: tuple[float, float, float] | None = None
     engine: Engine = "auto"
     cache: bool = True
     limits: Limits = dataclasses.field(default_factory=Limits)
@@ -145,6 +148,7 @@ class OptionKeywords(TypedDict, total=False):
     gravity: Iterable[float] | None
     ground: bool
     scale: float
+    origin: Iterable[float] | None
     engine: Engine
     cache: bool
     limits: Limits
@@ -160,12 +164,12 @@ _CHOICES: dict[str, tuple[str | None, ...]] = {
 }
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     **dict.fromkeys(("robots", "mesh_dirs"), ((Iterable, PathLike), "a sequence")),
-    **dict.fromkeys(("gravity", "exclude_pairs"), (Iterable, "a sequence")),
+    **dict.fromkeys(("gravity", "origin", "exclude_pairs"), (Iterable, "a sequence")),
     "query": ((str, PathLike), "a path"),
     "limits": (Limits, "Limits(...)"),
 }
 # None leaves to a problem XML what it may say, too.
-_OPTIONAL = ("query", "self_collision", "adjacent_links", "gravity")
+_OPTIONAL = ("query", "self_collision", "adjacent_links", "gravity", "origin")
 
 
 def _checked(name: str, given: object) -> object:
@@ -194,7 +198,7 @@ def _checked(name: str, given: object) -> object:
         return paths
     if name == "exclude_pairs":
         return tuple(_pair(pair) for pair in value)
-    return _gravity(value) if name == "gravity" else value
+    return _vector(name, value) if name in ("gravity", "origin") else value
 
 
 def _one_of(name: str, value: object, allowed: tuple[str | None, ...]) -> object:
@@ -211,11 +215,11 @@ def _pair(value: Any) -> tuple[str, str]:
     return str(pair[0]), str(pair[1])
 
 
-def _gravity(value: Iterable[Any]) -> tuple[float, ...]:
+def _vector(name: str, value: Iterable[Any]) -> tuple[float, ...]:
     values: tuple[Any, ...] = tuple(value)
     three = len(values) == 3 and all(isinstance(g, Real) for g in values)
     if not (three and all(abs(g) <= LARGEST for g in values)):
-        raise ValueError(f"gravity must be three finite numbers, got {values!r}")
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
     return tuple(float(g) for g in values)
 
 

@@ -96,13 +96,18 @@ def configuration_space(assembly: Assembly, options: Options) -> ConfigurationSp
         assembly.environment.boundary,
         options.scale,
         _sample_box(assembly),
+        assembly.origin,
     )
 
 
 def _sample_box(assembly: Assembly) -> tuple[Array, Array]:
-    """Return the obstacles' box grown by the greatest robot radius; twice that radius without obstacles."""
+    """Return the obstacles' box, in the file's frame, grown by the greatest robot radius.
+
+    Twice that radius without obstacles.
+    """
     radius = max((r.radius for r in assembly.robots), default=0.0)
     if not assembly.obstacles:
         return np.full(3, -2 * radius), np.full(3, 2 * radius)
-    corners = np.concatenate([p.mesh.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles])
-    return corners.min(axis=0) - radius, corners.max(axis=0) + radius
+    poses = [(p.mesh.vertices, p.mesh_pose) for p in assembly.obstacles]
+    corners = np.concatenate([v @ pose[:3, :3].T + pose[:3, 3] for v, pose in poses])
+    return corners.min(axis=0) - radius + assembly.origin, corners.max(axis=0) + radius + assembly.origin

@@ -51,6 +51,7 @@ class Report:
             greatest band of a mesh, since two meshes meet.
         meshes: One entry for each mesh.
         diagnostics: Number of diagnostics by severity.
+        origin: Where the MJCF's origin lies in the file's frame, metres.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Report:
     band: float
     meshes: tuple[MeshReport, ...] = field(repr=False)
     diagnostics: dict[str, int]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, for JSON."""
@@ -116,4 +118,5 @@ def report(compiled: Compiled) -> Report:
         band=assembly.band,
         meshes=tuple(meshes.values()),
         diagnostics=counts,
+        origin=assembly.origin,
     )

@@ -76,6 +76,23 @@ def transform(rotation: Array, position: ArrayLike) -> Array:
     return t
 
 
+def shifted(pose: Array, offset: ArrayLike) -> Array:
+    """Return the pose, (..., 4, 4), of a frame whose origin is at an offset, (3,), in the frame of a pose."""
+    out = pose.copy()
+    out[..., :3, 3] += pose[..., :3, :3] @ np.asarray(offset, dtype=np.float64)
+    return out
+
+
+def translated(poses: Array, by: ArrayLike) -> Array:
+    """Return poses, (..., 4, 4), moved by a vector of the world, (3,)."""
+    vector = np.asarray(by, dtype=np.float64)
+    if not vector.any():
+        return poses
+    out = poses.copy()
+    out[..., :3, 3] += vector
+    return out
+
+
 def pose_matrix(pose: Pose | None) -> Array:
     """Return the transform (4, 4) of a six-number pose; the identity for None."""
     if pose is None:

@@ -226,7 +226,7 @@ def identity(scene: Scene, what: str, file_units: bool) -> str:
     digest = hashlib.sha256()
     chosen = (options.collision, options.engine, options.semantics, options.scale)
     boundary = repr(compiled.assembly.environment.boundary)
-    facts = [installed_version(), what, file_units, *chosen, scene.pairs, space.names, boundary]
+    facts = [installed_version(), what, file_units, *chosen, scene.pairs, space.names, boundary, scene.origin.tolist()]
     digest.update(json.dumps(facts).encode())
     for array in (space.lower, space.upper, space.periodic, space.home, space.decode(np.ones(space.dim))):
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -12,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ..contact.types import short
 from ..errors import counted, robots_named
 from ..model.environment import Boundary, Resolution
 from ..summary import DofSummary, RobotSummary, SceneSummary
@@ -76,12 +77,17 @@ def geometry_part(report: Report, every: bool) -> Iterator[RenderableType]:
     yield _facts(
         [
             ("extent", f"{report.extent:.6g} m"),
+            *_origin(report.origin),
             ("mass", f"{report.mass:.6g} kg, all links"),
             ("geoms", f"{report.geoms} that collide"),
             ("pairs", f"{report.pairs} tested"),
             ("certain", f"beyond {report.band:.2g} m of contact"),
         ]
     )
+
+
+def _origin(origin: tuple[float, float, float]) -> list[tuple[str, str]]:
+    return [("origin", f"of the MJCF: {' '.join(map(short, origin))} m in the file's frame")] if any(origin) else []
 
 
 def pairs_part(counts: Sequence[PairCount], samples: int) -> Iterator[RenderableType]:
@@ -121,8 +127,8 @@ def _robot(number: int, robot: RobotSummary, most: int) -> Iterator[RenderableTy
         return
     table = _table("", "unit", "limits in file", "home", "limits in rad, m", "home", right=(3, 5))
     for dof in robot.dofs[:most]:
-        of_file = _limits(dof, dof.lower, dof.upper), f"{dof.home:.6g}"
-        in_si = _limits(dof, dof.lower_si, dof.upper_si), f"{dof.home_si:.6g}"
+        of_file = _limits(dof, dof.lower, dof.upper), short(dof.home)
+        in_si = _limits(dof, dof.lower_si, dof.upper_si), short(dof.home_si)
         table.add_row(*_cells(_short(dof.name, _LONGEST_NAME), _UNITS[dof.unit], *of_file, *in_si))
     for row in _left("...", len(robot.dofs) - most):
         table.add_row(*_cells(*row))
@@ -134,7 +140,7 @@ def _limits(dof: DofSummary, lower: float, upper: float) -> str:
         return "turns freely"
     if math.isinf(lower) and math.isinf(upper):
         return "none"
-    return f"{lower:.6g} to {upper:.6g}"
+    return f"{short(lower)} to {short(upper)}"
 
 
 def _semantics(scene: SceneSummary) -> str:
@@ -152,9 +158,9 @@ def _boundary(boundary: Boundary | None) -> str:
         return "none"
     if boundary.lower:
         sides = zip("xyz", boundary.lower, boundary.upper, strict=False)
-        inside = ", ".join(f"{axis} {low:g} to {high:g}" for axis, low, high in sides)
+        inside = ", ".join(f"{axis} {short(low)} to {short(high)}" for axis, low, high in sides)
     else:
-        inside = f"radius {boundary.radius:g} around {' '.join(f'{c:g}' for c in boundary.center)}"
+        inside = f"radius {boundary.radius:g} around {' '.join(map(short, boundary.center))}"
     return f"{boundary.shape.value}, {inside}, file units"
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.assembly import Part
+from ..geometry.assembly import Assembly, Part
 from ..geometry.orientation import encloses_any
 from ..model.environment import Boundary
 from ..pairs import Pair
@@ -76,15 +76,17 @@ class Containment:
 
 
 class BoundaryTest:
-    """Tests the vertices of links against a boundary, in metres; None accepts everything.
+    """Tests the vertices of a scene's links against its boundary, in metres; none accepts everything.
 
-    The boundary is closed; axes that it does not name are unbounded. Poses come in the order of the links.
+    The boundary is closed; axes that it does not name are unbounded. Poses come in the order of the links, about the
+    scene's origin.
     """
 
-    def __init__(self, boundary: Boundary | None, links: Sequence[Part]) -> None:
-        self._boundary, self._names = boundary, [p.name for p in links]
-        self._used = [np.unique(p.mesh.faces) for p in links]
-        self._vertices = [p.mesh.vertices[used] for p, used in zip(links, self._used, strict=True)]
+    def __init__(self, assembly: Assembly) -> None:
+        self._boundary, self._names = assembly.boundary, [p.name for p in assembly.links]
+        self._slack = boundary_slack(assembly)
+        self._used = [np.unique(p.mesh.faces) for p in assembly.links]
+        self._vertices = [p.used_vertices for p in assembly.links]
 
     def inside(self, poses: Array) -> NDArray[np.bool_]:
         """Return whether every vertex is inside, (n,), for link poses (n, nlinks, 4, 4)."""
@@ -106,17 +108,26 @@ class BoundaryTest:
                     found.append(Outside(name, int(self._used[i][worst]), world[0, worst], float(beyond[worst])))
         return found
 
-    @staticmethod
-    def _beyond(boundary: Boundary, world: Array) -> Array:
+    def _beyond(self, boundary: Boundary, world: Array) -> Array:
         """Return how far points (n, v, 3) are outside, (n, v); zero or less inside."""
         if boundary.lower:
             axes = len(boundary.lower)
             lower, upper = np.array(boundary.lower), np.array(boundary.upper)
-            slack = ROUNDING * float(np.max(np.abs([lower, upper])))
+            slack = self._slack
             beyond = np.maximum(lower - slack - world[..., :axes], world[..., :axes] - (upper + slack))
             return beyond.max(axis=-1)
         away = np.linalg.norm(world[..., : len(boundary.center)] - boundary.center, axis=-1)
-        return away - boundary.radius * (1 + ROUNDING)
+        return away - (boundary.radius + self._slack)
+
+
+def boundary_slack(assembly: Assembly) -> float:
+    """Return how far beyond the boundary, in metres, a vertex may be found that lies on it."""
+    boundary = assembly.boundary
+    if boundary is None:
+        return 0.0
+    size = float(np.max(np.abs([boundary.lower, boundary.upper]))) if boundary.lower else boundary.radius
+    # Numbers of the file that are far away were rounded before they came here.
+    return ROUNDING * size + 4 * float(np.spacing(np.abs(assembly.origin).max())) * any(assembly.origin)
 
 
 def _placed(poses: Array, vertices: Array) -> Array:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 
 import mujoco
@@ -14,22 +16,37 @@ from ..transforms import Array
 from .arena import collide, collide_in_parts, new_data, restart, silence
 from .types import Contact, deepest
 
+# Extents in metres between which MuJoCo's tolerances, which are absolute, are small enough, and large enough; and one
+# that is well between them.
+_SMALLEST, _LARGEST, _CHOSEN = 1.0, 1e3, 16.0
+
+_CCD_TOLERANCE = 1e-6
+
+# What a model measures in metres, besides the positions of slides and free joints.
+_LENGTHS = (
+    "body_pos", "body_ipos", "jnt_pos", "geom_pos", "geom_size", "geom_aabb", "geom_rbound", "bvh_aabb", "mesh_vert",
+    "site_pos",
+)  # fmt: skip
+
 
 class MujocoEngine:
     """Asks `mj_collision` about configurations.
 
     The engine has a model of its own, in which only links and obstacles collide: ground and walls act in simulation
-    alone. It also sees the explicit pairs of bodies that cannot move, which are decided elsewhere.
+    alone. It also sees the explicit pairs of bodies that cannot move, which are decided elsewhere. Where the scene is
+    tiny or huge, this model is larger or smaller by a power of two, because MuJoCo's tolerances are absolute.
 
     Args:
         model: The scene's model.
         owners: Name of the body that each collision geom belongs to.
+        extent: Of the scene, in metres.
+        own: Whether the model is that of another engine of the same scene.
 
     Attributes:
         model: The engine's own model; an engine made of it answers alike.
     """
 
-    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str]) -> None:
+    def __init__(self, model: mujoco.MjModel, owners: Mapping[str, str], extent: float, own: bool = False) -> None:
         names = list(dict.fromkeys(owners.values()))
         index = {n: i for i, n in enumerate(names)}
         self._names = names
@@ -49,6 +66,26 @@ class MujocoEngine:
         # overlaps of aligned boxes (coplanar plates that cross), libccd's does not.
         for flag in (mujoco.mjtDisableBit.mjDSBL_MULTICCD, mujoco.mjtDisableBit.mjDSBL_NATIVECCD):
             self.model.opt.disableflags |= int(flag)
+        self.model.opt.ccd_tolerance = _CCD_TOLERANCE
+        self._lengths = _lengths_of_qpos(model)
+        self._size = 1.0 if _SMALLEST <= extent <= _LARGEST else 2.0 ** round(math.log2(_CHOSEN / extent))
+        if not own:
+            self._grow(self._size)
+
+    def _grow(self, factor: float) -> None:
+        """Make the model larger; powers of two change no digit of any number."""
+        if factor == 1:
+            return
+        for name in _LENGTHS:
+            getattr(self.model, name)[:] *= factor
+        self.model.qpos0[self._lengths] *= factor
+
+    def _place(self, row: Array, data: mujoco.MjData) -> None:
+        """Put the bodies of `data` at qpos, in metres."""
+        data.qpos[:] = row
+        if self._size != 1:
+            data.qpos[self._lengths] *= self._size
+        mujoco.mj_kinematics(self.model, data)
 
     def data(self) -> mujoco.MjData:
         """Return scratch data for one thread."""
@@ -58,12 +95,11 @@ class MujocoEngine:
 
     def collide(self, qpos: Array, data: mujoco.MjData) -> NDArray[np.bool_]:
         """Return whether anything touches, (n,), for qpos of shape (n, nq)."""
-        model, kinematics, collision = self.model, mujoco.mj_kinematics, mujoco.mj_collision
+        model, place, collision = self.model, self._place, mujoco.mj_collision
         hits = np.zeros(len(qpos), dtype=bool)
         full = data.warning[int(mujoco.mjtWarning.mjWARN_CONTACTFULL)]
         for i, row in enumerate(qpos):
-            data.qpos[:] = row
-            kinematics(model, data)
+            place(row, data)
             before = full.number
             try:
                 collision(model, data)
@@ -77,8 +113,7 @@ class MujocoEngine:
 
     def _found(self, qpos: Array, data: mujoco.MjData) -> Iterator[mujoco.MjData]:
         """Return data with all contacts of one qpos, at once or, where memory is too short for that, some at a time."""
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(self.model, data)
+        self._place(qpos, data)
         if not collide(self.model, data):
             return iter((data,))
         return collide_in_parts(self.model, data, self._links, self._obstacles)
@@ -90,8 +125,8 @@ class MujocoEngine:
                 continue
             # Iterating data.contact costs more than the query itself.
             contacts = each.contact
-            geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos.copy()
-            distances = contacts.dist.copy()
+            geoms, frames, places = contacts.geom.copy(), contacts.frame.copy(), contacts.pos / self._size
+            distances = contacts.dist / self._size
             for i, (a, b) in enumerate(geoms):
                 names = self._names[self._owner[a]], self._names[self._owner[b]]
                 yield *names, places[i], frames[i, :3], float(distances[i])
@@ -109,22 +144,31 @@ class MujocoEngine:
         poses = np.zeros((len(qpos), len(bodies), 4, 4))
         poses[..., 3, 3] = 1.0
         for i, row in enumerate(qpos):
-            data.qpos[:] = row
-            mujoco.mj_kinematics(self.model, data)
+            self._place(row, data)
             poses[i, :, :3, :3] = data.xmat[bodies].reshape(-1, 3, 3)
-            poses[i, :, :3, 3] = data.xpos[bodies]
+            poses[i, :, :3, 3] = data.xpos[bodies] / self._size
         return poses
 
+    def static_contacts(self, pairs: tuple[Pair, ...]) -> tuple[Contact, ...]:
+        """Return the contacts of all constant pairs, the deepest of each, about the model's origin."""
+        model, data = self.model, self.data()
+        mujoco.mj_kinematics(model, data)
+        geoms: dict[str, list[int]] = {}
+        for geom in np.flatnonzero(self._owner >= 0).tolist():
+            geoms.setdefault(self._names[self._owner[geom]], []).append(geom)
+        constant = [p for p in pairs if p.constant and p.link in geoms and p.other in geoms]
+        found = (c for p in constant for c in _touches(model, data, p, geoms[p.link], np.array(geoms[p.other])))
+        return tuple(
+            dataclasses.replace(c, position=c.position / self._size, distance=c.distance / self._size)
+            for c in deepest(found)
+        )
 
-def static_contacts(
-    model: mujoco.MjModel, data: mujoco.MjData, pairs: tuple[Pair, ...], owners: Mapping[str, str]
-) -> tuple[Contact, ...]:
-    """Return the contacts of all constant pairs, the deepest of each; `data` has kinematics at any configuration."""
-    geoms: dict[str, list[int]] = {}
-    for geom, owner in owners.items():
-        geoms.setdefault(owner, []).append(int(model.geom(geom).id))
-    constant = [p for p in pairs if p.constant and p.link in geoms and p.other in geoms]
-    return deepest(c for p in constant for c in _touches(model, data, p, geoms[p.link], np.array(geoms[p.other])))
+
+def _lengths_of_qpos(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """Return which entries of qpos are lengths."""
+    kinds = {int(mujoco.mjtJoint.mjJNT_FREE): 3, int(mujoco.mjtJoint.mjJNT_SLIDE): 1}
+    joints = zip(model.jnt_qposadr.tolist(), model.jnt_type.tolist(), strict=True)
+    return np.array([first + i for first, kind in joints for i in range(kinds.get(kind, 0))], dtype=np.int64)
 
 
 def _touches(

@@ -17,16 +17,15 @@ from ..options import Collision, Engine
 from ..pairs import Pair
 from ..pipeline import Compiled
 from ..system.locks import Lock, lazy_property
-from ..transforms import Array
-from .arena import new_data
+from ..transforms import Array, shifted, translated
 from .clearance import BAND, Clearance
 from .containment import BoundaryTest, Containment
 from .edges import EdgeSteps, MotionBounds, certified, even_rows
 from .exact.engine import ExactEngine, available, compile_all
 from .manifold import Manifolds, Touch
-from .mujoco_engine import MujocoEngine, static_contacts
+from .mujoco_engine import MujocoEngine
 from .surfaces import Surfaces
-from .types import BrokenLimit, Contact, PackedContacts, Reason, Verdict, deepest
+from .types import BrokenLimit, Contact, PackedContacts, Reason, Verdict, deepest, moved
 
 # Configurations of edges that are made at once.
 _BLOCK = 10_000
@@ -49,9 +48,11 @@ class ContactQueries:
         self._pairs = compiled.pairs.tested
         self._pair_of = {frozenset((p.link, p.other)): i for i, p in enumerate(self._pairs)}
         self._parts: dict[str, Part] = {p.name: p for p in assembly.parts()}
-        self._engine = MujocoEngine(model, document.owners)
+        self._engine = MujocoEngine(model, document.owners, assembly.extent, own=static is not None)
         self._bodies = np.array([model.body(p.name).id for p in self.links], dtype=np.int64)
-        self._boundary = BoundaryTest(assembly.environment.boundary, self.links)
+        self._boundary = BoundaryTest(assembly)
+        self._obstacle_poses = {p.name: p.mesh_pose for p in assembly.obstacles}
+        self._off_center = [(p.name, p.mesh.center) for p in self.links if any(p.mesh.center)]
         self._containment = Containment(self._pairs, self._parts)
         self._collision: Collision = compiled.options.collision
         self._scratch = threading.local()
@@ -65,9 +66,7 @@ class ContactQueries:
         self.steps = EdgeSteps(assembly, self._space)
         self._motion = MotionBounds(assembly, self._space, between_links)
         if static is None:
-            data = new_data(model)
-            mujoco.mj_kinematics(model, data)
-            static = static_contacts(model, data, self._pairs, document.owners)
+            static = self._engine.static_contacts(self._pairs)
         self._static = static
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -87,7 +86,11 @@ class ContactQueries:
         return 8 * (columns + 32 * len(self.links) + len(self._moving) + 6 * vertices)
 
     def link_poses(self, rows: Array) -> Array:
-        """Return the world poses of all links, (n, nlinks, 4, 4)."""
+        """Return the world poses of all links in the file's frame, (n, nlinks, 4, 4)."""
+        return translated(self._link_poses(rows), self._assembly.origin)
+
+    def _link_poses(self, rows: Array) -> Array:
+        """Return the poses of all links about the scene's origin, (n, nlinks, 4, 4)."""
         return self._engine.body_poses(self._space.qpos_of_checked(rows), self._bodies, self._thread_data())
 
     def collisions(self, rows: Array, engine: Engine | None = None) -> NDArray[np.bool_]:
@@ -106,7 +109,7 @@ class ContactQueries:
             return exact.validities(rows)
         valid = self._space.within_limits(rows)
         if valid.any():
-            valid[valid] = self._boundary.inside(self.link_poses(rows[valid]))
+            valid[valid] = self._boundary.inside(self._link_poses(rows[valid]))
         if valid.any():
             valid[valid] = ~self._hits(rows[valid])
         return valid
@@ -252,7 +255,7 @@ class ContactQueries:
         if not found and not others and exact is not None:
             # Within the band of contact, cells may part what triangles say touches.
             others = self._triangles.clearance.nearest_pairs(poses)
-        return self._triangles.manifolds.contacts(found, others, poses)
+        return moved(self._triangles.manifolds.contacts(found, others, poses), self._assembly.origin)
 
     def packed_contacts(self, rows: Array, engine: Engine | None = None) -> PackedContacts:
         """Return the contacts of configurations (n, dim)."""
@@ -273,7 +276,7 @@ class ContactQueries:
             BrokenLimit(space.names[i], float(row[i]), float(space.lower[i]), float(space.upper[i]))
             for i in np.flatnonzero(space.broken(row))
         ]
-        return *limits, *self._boundary.outside(self.link_poses(row[None])[0])
+        return *limits, *moved(self._boundary.outside(self._link_poses(row[None])[0]), self._assembly.origin)
 
     def explain(self, row: Array, engine: Engine | None = None) -> Verdict:
         """Return all that is wrong with one configuration, (dim,)."""
@@ -281,12 +284,13 @@ class ContactQueries:
 
     def contacts_of_poses(self, poses: Array) -> list[Contact]:
         """Return the contacts of links that stand anywhere, (nlinks, 4, 4), found on triangles."""
-        by_name = self._named(poses[None])
+        by_name = self._named(translated(poses, -np.array(self._assembly.origin))[None])
         if self._triangles.clearance.signed(by_name, 1)[0] > 0:
             return []
         inside = self._containment.pairs_inside(by_name) if self._containment.needed else []
         pairs = {*self._triangles.clearance.nearest_pairs(by_name), *(index for index, _ in inside)}
-        return [c for c in self._triangles.manifolds.contacts({}, pairs, by_name) if c.distance <= 0]
+        found = [c for c in self._triangles.manifolds.contacts({}, pairs, by_name) if c.distance <= 0]
+        return moved(found, self._assembly.origin)
 
     def _thread_data(self) -> mujoco.MjData:
         data = getattr(self._scratch, "data", None)
@@ -295,13 +299,15 @@ class ContactQueries:
         return data
 
     def _poses_by_name(self, rows: Array) -> dict[str, Array]:
-        return self._named(self.link_poses(rows))
+        return self._named(self._link_poses(rows))
 
     def _named(self, poses: Array) -> dict[str, Array]:
-        """Return the poses of links, (n, nlinks, 4, 4), and of obstacles by name, (n, 4, 4) each."""
+        """Return the poses of the meshes of links at (n, nlinks, 4, 4), and of obstacles, by name, (n, 4, 4) each."""
         by_name = {p.name: poses[:, i] for i, p in enumerate(self.links)}
-        for part in self._assembly.obstacles:
-            by_name[part.name] = np.broadcast_to(part.pose, (len(poses), 4, 4))
+        for name, center in self._off_center:
+            by_name[name] = shifted(by_name[name], center)
+        for name, pose in self._obstacle_poses.items():
+            by_name[name] = np.broadcast_to(pose, (len(poses), 4, 4))
         return by_name
 
     @lazy_property

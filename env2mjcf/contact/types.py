@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..pairs import ContactKind
 
@@ -69,7 +69,7 @@ class BrokenLimit:
     upper: float
 
     def __str__(self) -> str:
-        return f"{self.name} is {self.value:.6g}; limits {self.lower:.6g} to {self.upper:.6g}"
+        return f"{self.name} is {short(self.value)}; limits {short(self.lower)} to {short(self.upper)}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +93,14 @@ class Outside:
 
 
 Reason: TypeAlias = Contact | BrokenLimit | Outside
+
+_Somewhere = TypeVar("_Somewhere", Contact, Outside)
+
+
+def moved(found: Sequence[_Somewhere], by: ArrayLike) -> list[_Somewhere]:
+    """Return contacts, or what is outside, with their positions moved by a vector of the world, (3,)."""
+    vector = np.asarray(by, dtype=np.float64)
+    return [replace(f, position=f.position + vector) for f in found] if vector.any() else list(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,5 +193,10 @@ class PathReport:
     contacts: tuple[Contact, ...]
 
 
+def short(value: float) -> str:
+    """Return a number with six digits, or more if the first ones say where on a map it is."""
+    return f"{value:.6g}" if abs(value) < 1e5 or abs(value) > 1e9 else f"{value:.11g}"
+
+
 def _numbers(position: NDArray[np.float64]) -> str:
-    return ", ".join(f"{x:.6g}" for x in position)
+    return ", ".join(map(short, position.tolist()))

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..kinematics.forward import RobotKinematics
-from ..limits import LARGEST, Limits, Work, bounded
-from ..model.environment import Body, Environment, JointType, MultiBody, Recentring
+from ..limits import Limits, Work, bounded
+from ..model.environment import Body, Boundary, Environment, JointType, Recentring
 from ..model.names import body_names
+from ..model.scaling import moved_boundary
 from ..options import Options
-from ..transforms import Array
+from ..transforms import Array, shifted
 from .analysis import Analysis
 from .certificate import Certificate, certificate
 from .inertia import Inertial, inertial
 from .mesh import Mesh, load_mesh
+from .pieces import LEAST_AREA
+from .placement import AtHome, Placed, Point, bounding_box, local_origin, report_frame
 from .repair import repair_diagnostics, repaired
 from .resolve import resolve_all
 from .shapes import CONCAVE_PER_THICKNESS, CollisionShape, collision_shape
@@ -28,9 +30,6 @@ from .union import Union, union, union_diagnostics
 # Half of the band of 1e-5 of the extent in which verdicts may differ from the triangles.
 _THICKNESS_PER_EXTENT = 5e-6
 
-# Extents in metres beyond which the unit of a file is doubtful.
-_PLAUSIBLE_EXTENT = (1e-3, 1e4)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
@@ -39,8 +38,8 @@ class Part:
     Attributes:
         name: Unique name.
         body: Its description.
-        pose: (4, 4) world pose at home.
-        mesh: In the body's frame, recentred and scaled.
+        pose: (4, 4) pose of the body at home, about the scene's origin.
+        mesh: Recentred and scaled, in the body's frame but for its `center`.
         analysis: What the mesh is like.
         shape: Convex pieces for contact; None for a Surface body.
         inertial: Mass, centre and moments; None for a static body.
@@ -59,7 +58,17 @@ class Part:
     @property
     def radius(self) -> float:
         """Greatest distance of a vertex from the body's origin."""
-        return float(np.linalg.norm(self.mesh.vertices, axis=1).max())
+        return float(np.linalg.norm(self.mesh.vertices + self.mesh.center, axis=1).max())
+
+    @property
+    def used_vertices(self) -> Array:
+        """The vertices that faces use, (k, 3), in the body's frame."""
+        return self.mesh.used_vertices + self.mesh.center
+
+    @property
+    def mesh_pose(self) -> Array:
+        """The pose of the mesh's own frame, (4, 4): that of the body, but for the mesh's `center`."""
+        return shifted(self.pose, self.mesh.center)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +106,9 @@ class Assembly:
         robots: In the order of `environment.robots`.
         obstacles: Bodies that links are tested against, in file order.
         surfaces: Bodies that are only drawn.
-        lower, upper: (3,) corners of the bounding box of all bodies at home; the boundary is not counted.
+        lower, upper: (3,) corners of the bounding box of all bodies at home, about `origin`. The boundary is not
+            counted, nor the place of a robot that travels and is at home far from all else: see `bounding_box`.
+        origin: Where the origin of poses lies in the file's frame, in metres. Configurations are in the file's frame.
     """
 
     environment: Environment
@@ -106,6 +117,13 @@ class Assembly:
     surfaces: tuple[Part, ...]
     lower: Array
     upper: Array
+    origin: Point = (0.0, 0.0, 0.0)
+
+    @property
+    def boundary(self) -> Boundary | None:
+        """The boundary about `origin`."""
+        boundary = self.environment.boundary
+        return None if boundary is None else moved_boundary(boundary, self.origin)
 
     @property
     def extent(self) -> float:
@@ -127,16 +145,6 @@ class Assembly:
         return (*self.links, *self.obstacles, *self.surfaces)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Placed:
-    """A body whose place is known and whose collision shape is not."""
-
-    name: str
-    body: Body
-    pose: Array
-    mesh: Mesh
-
-
 def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> Assembly:
     """Load every mesh of a scene and give each body its geometry.
 
@@ -154,35 +162,33 @@ def assemble(environment: Environment, options: Options, log: DiagnosticLog) -> 
     meshes = _Meshes(environment, options, log)
     names = body_names(environment)
     active, drawn = ({id(m) for m in group} for group in (environment.robots, environment.surfaces))
-    placed: list[tuple[MultiBody, RobotKinematics, Array, list[_Placed]]] = []
+    origin: Point = options.origin or (0.0, 0.0, 0.0)
+    placed: list[AtHome] = []
     for i, multibody in enumerate(environment.multibodies):
         # How robots hang together was judged when they were read.
         kinematics = RobotKinematics.of(multibody, None if id(multibody) in active else log)
-        home = kinematics.home(log)
-        # `_bounding_box` finds what overflows.
-        with np.errstate(over="ignore", invalid="ignore"):
-            poses = kinematics.forward(home)
-        bodies = [
-            _Placed(name, body, pose, meshes.mesh(body))
-            for name, body, pose in zip(names[i], multibody.bodies, poses, strict=True)
-        ]
-        placed.append((multibody, kinematics, home, bodies))
-    lower, upper = _bounding_box([b for *_, bodies in placed for b in bodies], log)
+        bodies = [Placed(n, b, np.eye(4), meshes.mesh(b)) for n, b in zip(names[i], multibody.bodies, strict=True)]
+        placed.append(AtHome(kinematics, kinematics.home(log), tuple(bodies)).about(origin))
+    lower, upper, away = bounding_box(placed, log)
+    if options.origin is None and any(origin := local_origin(lower, upper)):
+        placed = [m.about(origin) for m in placed]
+        lower, upper, away = bounding_box(placed, log)
+    report_frame(environment, placed, away, (lower, upper), origin, options.origin is not None, log)
     thickness = _THICKNESS_PER_EXTENT * float(np.linalg.norm(upper - lower))
-    _check_extent(environment, float(np.linalg.norm(upper - lower)), log)
     robots: dict[int, RobotParts] = {}
     obstacles: list[Part] = []
     surfaces: list[Part] = []
-    for multibody, kinematics, home, bodies in placed:
-        if id(multibody) in active:
+    for multibody in placed:
+        key, bodies = id(multibody.kinematics.multibody), multibody.bodies
+        if key in active:
             links = tuple(meshes.part(b, thickness, moves=True) for b in bodies)
-            robots[id(multibody)] = RobotParts(kinematics, home, links)
-        elif id(multibody) in drawn:
+            robots[key] = RobotParts(multibody.kinematics, multibody.home, links)
+        elif key in drawn:
             surfaces += [meshes.part(b, thickness, moves=False, collides=False) for b in bodies]
         else:
             obstacles += [meshes.part(b, thickness, moves=False) for b in bodies]
     ordered = tuple(robots[id(m)] for m in environment.robots)
-    return Assembly(environment, ordered, tuple(obstacles), tuple(surfaces), lower, upper)
+    return Assembly(environment, ordered, tuple(obstacles), tuple(surfaces), lower, upper, origin)
 
 
 class _Meshes:
@@ -208,12 +214,12 @@ class _Meshes:
         if key not in self._meshes:
             if path not in self._raw:
                 self._raw[path] = load_mesh(path, self._log, self._options.limits)
-            self._meshes[key] = self._raw[path].recentred(body.recentring).scaled(self._options.scale)
+            self._meshes[key] = self._raw[path].recentred(body.recentring).scaled(self._options.scale).centred()
         self._elements += len(self._meshes[key].faces)
         self._at_most("scene_elements", self._elements, "GEO271", "triangles", body)
         return self._meshes[key]
 
-    def part(self, placed: _Placed, thickness: float, *, moves: bool, collides: bool = True) -> Part:
+    def part(self, placed: Placed, thickness: float, *, moves: bool, collides: bool = True) -> Part:
         """Give a placed body its shape (where it collides) and its inertia (where it moves)."""
         mesh, body, options = placed.mesh, placed.body, self._options
         if mesh not in self._analyses:
@@ -223,6 +229,10 @@ class _Meshes:
             self._analyses[mesh] = result.analysis, work
             repair_diagnostics(mesh, result, self._log, body.filename, body.span)
         analysis, work = self._analyses[mesh]
+        if 0 < analysis.area < LEAST_AREA:
+            message = f"its area of {analysis.area:.3g} m^2 is below {LEAST_AREA:g}, the least of a mesh in MuJoCo"
+            hint = "enlarge the scene with scale= (--scale)"
+            self._log.fail("GEO241", body.filename, message, hint=hint, span=body.span)
         shape = proof = None
         if collides:
             if mesh not in self._shapes:
@@ -231,6 +241,8 @@ class _Meshes:
             self._cells += len(shape.pieces)
             self._at_most("scene_cells", self._cells, "GEO272", "convex pieces", body)
         inertia = inertial(mesh, analysis, options.density, body.mass, self._union(mesh, body)) if moves else None
+        if inertia is not None and any(mesh.center):
+            inertia = replace(inertia, com=inertia.com + mesh.center)
         if inertia is not None and inertia.note:
             self._log.info("GEO250", placed.name, f"inertia of {placed.name}: {inertia.note}", span=body.span)
         return Part(placed.name, body, placed.pose, mesh, analysis, shape, inertia, proof)
@@ -271,31 +283,3 @@ def _refuse_sma(environment: Environment, log: DiagnosticLog) -> None:
                     "the scene reads, but does not convert"
                 )
                 log.fail("KIN320", "SMAJoint", message, hint="replace it by Revolute joints", span=connection.span)
-
-
-def _bounding_box(bodies: Sequence[_Placed], log: DiagnosticLog) -> tuple[Array, Array]:
-    """Return the corners of the box around the used vertices of all bodies; the unit cube for no bodies."""
-    if not bodies:
-        return np.full(3, -0.5), np.full(3, 0.5)
-    corners: list[Array] = []
-    for b in bodies:
-        with np.errstate(over="ignore", invalid="ignore"):
-            world = b.mesh.used_vertices @ b.pose[:3, :3].T + b.pose[:3, 3]
-        farthest = float(np.abs(world).max())
-        # Not a number compares as false.
-        if not farthest <= LARGEST:
-            message = (
-                f"{b.name} reaches {farthest:.3g} m from the origin at home; at most {LARGEST:g} can be computed with"
-            )
-            hint = "correct its pose, or the connections that lead to it"
-            log.fail("GEO252", b.name, message, hint=hint, span=b.body.span)
-        corners += [world.min(axis=0), world.max(axis=0)]
-    stacked = np.array(corners)
-    return stacked.min(axis=0), stacked.max(axis=0)
-
-
-def _check_extent(environment: Environment, extent: float, log: DiagnosticLog) -> None:
-    low, high = _PLAUSIBLE_EXTENT
-    if not low <= extent <= high:
-        message = f"the scene measures {extent:.3g} m across: is its unit a metre?"
-        log.info("GEO251", environment.name, message, hint="give the metres per file unit with scale= (--scale)")

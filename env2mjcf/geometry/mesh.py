@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +24,9 @@ from ..limits import LARGEST, Limits
 from ..model.environment import Recentring
 from ..system.files import open_regular
 
+FAR = 1e3
+"""What is farther from the origin than this, in its own sizes, is computed with about an origin of its own."""
+
 
 # Without slots, so that what is computed of the arrays is kept.
 @dataclass(frozen=True, eq=False)
@@ -34,21 +38,33 @@ class Mesh:
         vertices: (n, 3) float64, read-only; every vertex of the file in its order, used or not.
         faces: (m, 3) int64, read-only; indices into `vertices`, counter-clockwise from outside.
         path: The file that it was read from.
+        center: Where the origin of the vertices lies in the body's frame; elsewhere than there if they are far from it.
+        rounding: How far apart numbers are that single precision can tell, at these vertices before they are centred.
     """
 
     name: str
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     path: Path
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rounding: float = 0.0
 
     @classmethod
-    def from_arrays(cls, name: str, vertices: object, faces: object, path: Path = Path()) -> Mesh:
+    def from_arrays(
+        cls,
+        name: str,
+        vertices: object,
+        faces: object,
+        path: Path = Path(),
+        center: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        rounding: float = 0.0,
+    ) -> Mesh:
         """Build a mesh from anything array-like; the arrays are copied and made read-only."""
         v = np.array(vertices, dtype=np.float64).reshape(-1, 3)
         f = np.array(faces, dtype=np.int64).reshape(-1, 3)
         v.setflags(write=False)
         f.setflags(write=False)
-        return cls(name, v, f, path)
+        return cls(name, v, f, path, center, rounding)
 
     @cached_property
     def used_vertices(self) -> NDArray[np.float64]:
@@ -92,6 +108,27 @@ class Mesh:
         if factor == 1.0:
             return self
         return Mesh.from_arrays(self.name, self.vertices * factor, self.faces, self.path)
+
+    def centred(self) -> Mesh:
+        """Return the mesh about a round point amid it, if it is far from its frame's origin: see `round_point`."""
+        used = self.used_vertices
+        lower, upper = used.min(axis=0), used.max(axis=0)
+        center = round_point((lower + upper) / 2, self.diagonal, lower, upper)
+        if not any(center):
+            return self
+        rounding = float(np.spacing(np.abs(used).max().astype(np.float32)))
+        return Mesh.from_arrays(self.name, self.vertices - center, self.faces, self.path, center, rounding)
+
+
+def round_point(
+    middle: NDArray[np.float64], size: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return the middle of something, rounded to its size; zero unless it reaches a thousand sizes from the origin."""
+    if not size or max(np.abs(lower).max(), np.abs(upper).max()) <= FAR * size:
+        return 0.0, 0.0, 0.0
+    digits = -math.floor(math.log10(size))
+    x, y, z = (round(float(c), digits) + 0.0 for c in middle)
+    return x, y, z
 
 
 _READERS: dict[str, Callable[[bytes, str, DiagnosticLog, Limits], MeshArrays]] = {

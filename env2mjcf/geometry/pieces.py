@@ -23,7 +23,9 @@ points that are nearly coplanar."""
 LEAST_WIDTH = 1e-7
 """Least width of a piece in metres: below 5e-15 square metres MuJoCo finds a mesh's surface too small."""
 
-_LEAST_AREA = 2e-14
+LEAST_AREA = 2e-14
+"""Least area of a mesh in square metres that MuJoCo takes, with room for rounding."""
+
 _BLOCK = 2_000_000  # distances from corners to edges that are computed at once
 
 
@@ -150,10 +152,10 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         for row, i in enumerate(members):
             if narrow[row]:
                 rectangle = _widened(local[row], normals[row], thickness)
-                if _surfaces(rectangle[None], thickness)[0] >= _LEAST_AREA:
+                if _surfaces(rectangle[None], thickness)[0] >= LEAST_AREA:
                     whole = np.concatenate([rectangle + shift[row, 0], rectangle + shift[row, 1]])
                     out[i] = frozen_piece(whole, centers[row], polygons[i])
-            elif surfaces[row] >= _LEAST_AREA:
+            elif surfaces[row] >= LEAST_AREA:
                 out[i] = ConvexPiece(points[row], centers[row], polygons[i])
     return tuple(piece for piece in out if piece is not None)
 

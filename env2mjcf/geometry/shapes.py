@@ -17,7 +17,7 @@ from .convexity import Box, exact_box, is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
-from .pieces import ConvexPiece, hull_piece, hull_volume, prisms
+from .pieces import LEAST_AREA, ConvexPiece, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
@@ -44,6 +44,7 @@ class CollisionShape:
         analysis: The mesh's analysis.
         note: One sentence for the report.
         omitted_area: Area of polygons that are too small for MuJoCo.
+        omitted_length: Greatest length of one of them.
         box: The box that the one piece is, to within a tenth of the band of contact.
     """
 
@@ -54,6 +55,7 @@ class CollisionShape:
     analysis: Analysis
     note: str
     omitted_area: float = 0.0
+    omitted_length: float = 0.0
     box: Box | None = None
 
 
@@ -111,9 +113,13 @@ def collision_shape(
         hint = "close the mesh, or give it a wall thickness, if its inside matters"
         log.info("GEO243", subject, shape.note, hint=hint, span=span)
     if shape.omitted_area:
-        message = f"polygons of area {shape.omitted_area:.3g} in all are too small for MuJoCo and do not collide"
-        hint = "MuJoCo cannot hold pieces of less than about 0.1 micrometre: enlarge the scene with `scale`"
-        report = log.warn if shape.pieces else log.fail
+        message = (
+            f"polygons of area {shape.omitted_area:.3g} m^2 in all, up to {shape.omitted_length:.3g} m long, are too "
+            f"small for MuJoCo, whose least area of a mesh is {LEAST_AREA:g} m^2, and do not collide"
+        )
+        hint = "enlarge the scene with scale= (--scale)"
+        # A hole that is no longer than verdicts may be off changes none of those that are certain.
+        report = log.warn if shape.pieces and shape.omitted_length <= 2 * thickness else log.fail
         report("GEO241", subject, message, hint=hint, span=span)
     return shape
 
@@ -146,27 +152,36 @@ def _hull_note(analysis: Analysis, piece: ConvexPiece) -> str:
 def _surface(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> CollisionShape:
     pieces, omitted = _prisms(analysis, np.ones(analysis.components, dtype=np.bool_), thickness)
     note = f"{counted(len(analysis.faces), 'triangle')} in {counted(len(pieces), 'prism')}"
-    return CollisionShape(mesh, "surface", pieces, False, analysis, note, omitted)
+    return CollisionShape(mesh, "surface", pieces, False, analysis, note, *_together(omitted))
 
 
-def _prisms(analysis: Analysis, chosen: Bools, thickness: float) -> tuple[tuple[ConvexPiece, ...], float]:
-    """Return prisms on the polygons of some components, (c,), those of solids inside of them; and the area left out."""
+def _prisms(
+    analysis: Analysis, chosen: Bools, thickness: float
+) -> tuple[tuple[ConvexPiece, ...], list[tuple[float, float]]]:
+    """Return prisms on the polygons of some components, (c,), those of solids inside of them; and what is left out."""
     pieces: tuple[ConvexPiece, ...] = ()
-    omitted = 0.0
+    omitted: list[tuple[float, float]] = []
     for inward in (True, False):
         rows = np.flatnonzero((chosen & (analysis.solids == inward))[analysis.component])
         polygons = convex_polygons(analysis.vertices, analysis.faces[rows], analysis.tolerance)
         made = prisms(analysis.vertices, polygons, thickness, inward=inward)
         kept = {id(piece.polygon) for piece in made}
-        omitted += _area(analysis, rows, [p for p in polygons if id(p) not in kept])
+        omitted.append(_omitted(analysis, rows, [p for p in polygons if id(p) not in kept]))
         pieces += made
     return pieces, omitted
 
 
-def _area(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> float:
-    """Return the area of polygons whose faces are rows of `faces`."""
+def _together(omitted: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return sum(area for area, _ in omitted), max((length for _, length in omitted), default=0.0)
+
+
+def _omitted(analysis: Analysis, faces: Ints, polygons: Sequence[Polygon]) -> tuple[float, float]:
+    """Return the area of polygons whose faces are rows of `faces`, and the greatest length of one."""
     lost = [face for polygon in polygons for face in polygon.faces]
-    return float(face_areas(analysis.vertices, analysis.faces[faces[lost]]).sum()) if lost else 0.0
+    if not lost:
+        return 0.0, 0.0
+    lengths = [np.linalg.norm(np.ptp(analysis.vertices[list(p.loop)], axis=0)) for p in polygons]
+    return float(face_areas(analysis.vertices, analysis.faces[faces[lost]]).sum()), float(max(lengths))
 
 
 def _hulled(hulls: tuple[ConvexPiece, ...]) -> str:
@@ -187,12 +202,12 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         for c in np.flatnonzero(whole)
     )
     notes = [_hulled(pieces)] if pieces else []
-    omitted = 0.0
+    omitted: list[tuple[float, float]] = []
     rest = np.flatnonzero((solids & ~whole)[analysis.component])
     if len(rest):
         lining = shells(analysis, rest, thickness, work)
         notes.append(_shell_note(lining, analysis.component_volumes[solids & ~whole].sum()))
-        omitted += _area(analysis, rest, lining.missing)
+        omitted.append(_omitted(analysis, rest, lining.missing))
         pieces += lining.pieces
     if not solids.all():
         sheets, left_out = _prisms(analysis, ~solids, thickness)
@@ -201,7 +216,7 @@ def _solid(mesh: Mesh, analysis: Analysis, thickness: float, work: Work) -> Coll
         pieces += sheets
     strategy = "hull" if whole.all() else "solid"
     hollow = len(rest) > 0 or bool((closed & ~solids).any())
-    return CollisionShape(mesh, strategy, pieces, hollow, analysis, ", ".join(notes), omitted)
+    return CollisionShape(mesh, strategy, pieces, hollow, analysis, ", ".join(notes), *_together(omitted))
 
 
 def _sheet_note(analysis: Analysis, count: int) -> str:

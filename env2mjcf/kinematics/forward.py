@@ -34,11 +34,13 @@ class RobotKinematics:
         multibody: Its description.
         tree: What places each body.
         dofs: The numbers of its configuration, in the planner's order.
+        origin: Where the origin of the poses lies in the file's frame, to which configurations and bodies refer.
     """
 
     multibody: MultiBody
     tree: Tree
     dofs: tuple[Dof, ...]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def of(cls, multibody: MultiBody, log: DiagnosticLog | None = None) -> RobotKinematics:
@@ -49,6 +51,12 @@ class RobotKinematics:
         """
         tree = build_tree(multibody, DiagnosticLog() if log is None else log)
         return cls(multibody, tree, degrees_of_freedom(multibody, tree))
+
+    @property
+    def travels(self) -> bool:
+        """Whether all its bases move about, so that its place at home says little."""
+        moving = {d.body for d in self.dofs if d.connection is None and d.kind.is_length}
+        return bool(self.tree.bases) and moving == set(self.tree.bases)
 
     @property
     def dim(self) -> int:
@@ -62,14 +70,14 @@ class RobotKinematics:
             q: Configurations, (..., dim).
 
         Returns:
-            World poses of the bodies in file order, (..., nbodies, 4, 4).
+            World poses of the bodies in file order, about `origin`, (..., nbodies, 4, 4).
         """
         values = np.asarray(q, dtype=np.float64)
         poses = np.empty((*values.shape[:-1], len(self.multibody.bodies), 4, 4))
         for body in self.tree.order:
             k = self.tree.parent[body]
             if k is None:
-                poses[..., body, :, :] = self._base(body, values)
+                poses[..., body, :, :] = self.base_pose(body, values)
             else:
                 previous = self.multibody.connections[k].previous
                 poses[..., body, :, :] = poses[..., previous, :, :] @ self.step(k, values)
@@ -167,14 +175,16 @@ class RobotKinematics:
         value = {DofKind.THETA: dh.theta, DofKind.ALPHA: dh.alpha, DofKind.D: dh.d}[dof.kind]
         return value if dof.kind.is_length else float(wrap(value))
 
-    def _base(self, body: int, q: Array) -> Array:
-        kind = self.tree.bases[body]
-        if kind is BaseKind.FIXED:
-            return pose_matrix(self.multibody.bodies[body].pose)
+    def base_pose(self, body: int, q: Array) -> Array:
+        """Return the pose of a base about `origin`, (..., 4, 4)."""
+        # What is far away cancels before anything is rounded.
+        if self.tree.bases[body] is BaseKind.FIXED:
+            pose = pose_matrix(self.multibody.bodies[body].pose)
+            return transform(pose[:3, :3], pose[:3, 3] - self.origin)
         zeros = np.zeros(q.shape[:-1])
         value = {kind: q[..., i] for kind, i in self.base_columns(body).items()}
         rotation = rotation_matrix(*(value.get(k, zeros) for k in ROTATIONS))
-        return transform(rotation, np.stack([value.get(k, zeros) for k in POSITIONS], axis=-1))
+        return transform(rotation, np.stack([value.get(k, zeros) for k in POSITIONS], axis=-1) - self.origin)
 
     def base_columns(self, body: int) -> dict[DofKind, int]:
         """Return the place in a configuration of each degree of freedom of a body's base; none where it has none."""

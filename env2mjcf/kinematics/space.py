@@ -54,6 +54,7 @@ class ConfigurationSpace:
         boundary: In metres; a base keeps within it.
         scale: Metres per file unit.
         sample_box: Corners of the box that degrees of freedom without limits are drawn from.
+        origin: Where the origin of qpos lies, in the frame of q.
 
     Attributes:
         names: One name for each degree of freedom.
@@ -61,6 +62,7 @@ class ConfigurationSpace:
         lower, upper: (dim,) limits in radians and metres; infinite where there are none.
         periodic: (dim,) whether the degree of freedom is an angle that turns without end.
         home: (dim,) the configuration that the files describe.
+        shift: (dim,) what q has more than qpos: the MJCF's origin, at the positions of bases.
         nq: Length of MuJoCo's qpos.
     """
 
@@ -72,6 +74,7 @@ class ConfigurationSpace:
         boundary: Boundary | None,
         scale: float,
         sample_box: tuple[Array, Array],
+        origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self.names = tuple(names)
         stops = np.cumsum([0, *(r.dim for r in robots)])
@@ -92,10 +95,12 @@ class ConfigurationSpace:
         )
         base = [d.kind if d.connection is None and d.kind.is_length else None for d in dofs]
         self._axis = np.array([-1 if k is None else POSITIONS.index(k) for k in base], dtype=np.int64)
+        self.shift = np.where(self._axis < 0, 0.0, np.array(origin)[self._axis])
         self._bound_bases(boundary)
         self._slots, self.nq = _layout(robots, self.robot_slices)
+        self._shifts = bool(self.shift.any())
         self._sample_box = sample_box
-        for array in (self.lower, self.upper, self.periodic, self.home, self._units):
+        for array in (self.lower, self.upper, self.periodic, self.home, self.shift, self._units):
             array.setflags(write=False)
 
     @property
@@ -173,12 +178,14 @@ class ConfigurationSpace:
         return np.array(task.configurations, dtype=np.float64).reshape(-1, len(units)) * (1.0 if radians else units)
 
     def qpos(self, q: ArrayLike) -> Array:
-        """Turn q (..., dim) into MuJoCo's qpos (..., nq)."""
+        """Turn q (..., dim), in the file's frame, into MuJoCo's qpos (..., nq), in the MJCF's."""
         return self.qpos_of_checked(self._last_axis(q, "q"))
 
     def qpos_of_checked(self, values: Array) -> Array:
         """Return `qpos` of configurations that were checked before: for loops in which every microsecond counts."""
         qpos = np.zeros((*values.shape[:-1], self.nq))
+        if self._shifts:
+            values = values - self.shift
         for slot in chain.from_iterable(self._slots):
             if not slot.free:
                 qpos[..., slot.address] = values[..., slot.columns[0]]
@@ -198,7 +205,7 @@ class ConfigurationSpace:
         values = real_array(qpos, "qpos")
         if values.shape[-1:] != (self.nq,):
             raise ValueError(f"qpos of shape {values.shape}; expected (..., {self.nq})")
-        q = np.broadcast_to(self.home, (*values.shape[:-1], self.dim)).copy()
+        q = np.broadcast_to(self.home - self.shift, (*values.shape[:-1], self.dim)).copy()
         for slot in chain.from_iterable(self._slots):
             if not slot.free:
                 q[..., slot.columns[0]] = values[..., slot.address]
@@ -207,7 +214,7 @@ class ConfigurationSpace:
             q[..., x : x + 3] = values[..., slot.address : slot.address + 3]
             quaternion = values[..., slot.address + 3 : slot.address + 7]
             q[..., x + 3], q[..., x + 4], q[..., x + 5] = angles_from_quaternion(_unit(quaternion))
-        return q
+        return q + self.shift
 
     def sample(self, n: int, seed: int) -> Array:
         """Draw n configurations uniformly between the limits, (n, dim); equal seeds give equal draws.

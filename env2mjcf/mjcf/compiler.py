@@ -19,7 +19,7 @@ from .geoms import add_contacts, excluded_obstacles
 from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
 from .loops import add_loops
-from .markup import Element, add, comment_text, numbers, plain, to_text
+from .markup import Element, add, comment_text, number, numbers, plain, to_text
 from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file
 
 
@@ -54,8 +54,8 @@ def compile_mjcf(
     world = add(root, "worldbody")
     add_scenery(world, assembly, options)
     add_obstacles(world, compilation)
-    for number in range(len(assembly.robots)):
-        add_robot(world, number, compilation)
+    for robot in range(len(assembly.robots)):
+        add_robot(world, robot, compilation)
     if options.ground:
         add_ground_material(asset)
     compilation.assets.write(asset)
@@ -82,6 +82,9 @@ def _header(assembly: Assembly, options: Options) -> str:
         f"Units: metres (file unit x {options.scale:g}), kilograms, radians. Extent {assembly.extent:.6g} m.",
         f"Verdicts are certain beyond {assembly.band:.2g} m of contact, {assembly.band / assembly.extent:.2g} of it.",
     ]
+    if any(assembly.origin):
+        place = ", ".join(map(number, assembly.origin))
+        lines.append(f"The origin lies at ({place}) m in the frame of {environment.name}.")
     seen: set[str] = set()
     for part in assembly.parts():
         if part.shape is not None and part.mesh.digest not in seen:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ..geometry.assembly import Part
 from ..pairs import PairTable
-from ..transforms import quaternion_from_matrix
+from ..transforms import Array, quaternion_from_matrix
 from .assets import AssetBook
 from .markup import Element, add, comment, numbers
 
@@ -31,34 +31,47 @@ def robot_color(number: int) -> tuple[float, ...]:
     return _ROBOT_COLORS[number % len(_ROBOT_COLORS)]
 
 
-def add_visual(parent: Element, part: Part, assets: AssetBook, color: tuple[float, ...] | None = None) -> None:
-    """Append the geom that is drawn; the file's colour wins, unless it is wholly transparent."""
+def add_visual(
+    parent: Element, part: Part, assets: AssetBook, place: Array, color: tuple[float, ...] | None = None
+) -> None:
+    """Append the geom that is drawn; the file's colour wins, unless it is wholly transparent.
+
+    `place` is where the frame of the mesh stands in that of the parent, (3,).
+    """
     rgba = part.body.color
     if rgba is None or rgba[3] == 0:
         rgba = color or (_SURFACE_COLOR if part.shape is None else _OBSTACLE_COLOR)
     mesh = assets.visual_name(part.mesh)
-    add(parent, "geom", name=f"{part.name}:visual", class_="visual", mesh=mesh, rgba=numbers(rgba))
+    pos = numbers(place) if place.any() else None
+    add(parent, "geom", name=f"{part.name}:visual", class_="visual", mesh=mesh, pos=pos, rgba=numbers(rgba))
 
 
 def add_collision(
-    parent: Element, part: Part, assets: AssetBook, *, obstacle: bool, primitives: bool, owners: dict[str, str]
+    parent: Element,
+    part: Part,
+    assets: AssetBook,
+    place: Array,
+    *,
+    obstacle: bool,
+    primitives: bool,
+    owners: dict[str, str],
 ) -> None:
-    """Append the geoms that collide, and note whose they are in `owners`."""
+    """Append the geoms that collide, and note whose they are in `owners`; `place` as for `add_visual`."""
     if part.shape is None:
         return
     masks = _OBSTACLE_MASKS if obstacle else {}
     box = part.shape.box if primitives else None
     if box is not None:
         name, size = f"{part.name}:0", numbers(box.half_sizes)
-        place = {"pos": numbers(box.center), "quat": numbers(quaternion_from_matrix(box.rotation))}
+        pose = {"pos": numbers(place + box.center), "quat": numbers(quaternion_from_matrix(box.rotation))}
         owners[name] = part.name
-        add(parent, "geom", name=name, class_="collision", type="box", size=size, **place, **masks)
+        add(parent, "geom", name=name, class_="collision", type="box", size=size, **pose, **masks)
         return
     assets.use_cells(part.mesh, part.shape)
     for i, piece in enumerate(part.shape.pieces):
         name = f"{part.name}:{i}"
         owners[name] = part.name
-        mesh, pos = assets.cell_name(part.mesh, i), numbers(piece.center)
+        mesh, pos = assets.cell_name(part.mesh, i), numbers(place + piece.center)
         add(parent, "geom", name=name, class_="collision", mesh=mesh, pos=pos, **masks)
 
 

@@ -89,7 +89,7 @@ def add_actuators(root: Element, robots: Sequence[RobotParts], space: Configurat
                 continue
             column = slot.columns[0]
             kind = robot.kinematics.dofs[column - columns.start].kind
-            low, high = float(space.lower[column]), float(space.upper[column])
+            low, high = (float(limit[column] - space.shift[column]) for limit in (space.lower, space.upper))
             bounded = np.isfinite(low) and np.isfinite(high) and low < high and not space.periodic[column]
             add(
                 actuator,

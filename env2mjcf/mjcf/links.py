@@ -10,10 +10,10 @@ from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
 from ..kinematics.space import ConfigurationSpace, children_first_to_last
-from ..kinematics.tree import DofKind, build_tree
+from ..kinematics.tree import POSITIONS, DofKind, build_tree
 from ..model.environment import Environment
 from ..options import Options
-from ..transforms import Array, inverse, quaternion_from_matrix
+from ..transforms import Array, inverse, quaternion_from_matrix, transform
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
 from .joints import add_base_joints, add_connection_joints
@@ -72,7 +72,7 @@ def add_obstacles(world: Element, compilation: Compilation) -> None:
     """Append obstacles and surfaces as world geoms, which MuJoCo's midphase sorts once for all."""
     for part in (*compilation.assembly.obstacles, *compilation.assembly.surfaces):
         tag = "body" if part.name in compilation.own_bodies else "frame"
-        place = add(world, tag, name=part.name, **_place(part.pose))
+        place = add(world, tag, name=part.name, **_place(part.mesh_pose))
         compilation.elements[part.name] = place
         _add_geoms(place, part, compilation, obstacle=True)
 
@@ -96,8 +96,10 @@ def _add_link(
     part = robot.links[body]
     local = part.pose if previous is None else inverse(robot.links[previous].pose) @ part.pose
     if previous is None and _has_slides(robot, body):
-        # A base on slides is placed by them alone; its home is the origin.
-        local = np.eye(4)
+        # A base on slides is placed by them alone: its home is the origin, on other axes that of the file.
+        slides = [d.kind for d in robot.kinematics.dofs if d.connection is None and d.body == body]
+        fixed = [k not in slides for k in POSITIONS]
+        local = transform(np.eye(3), np.where(fixed, -np.array(robot.kinematics.origin), 0.0))
     element = add(parent, "body", name=part.name, **_place(local))
     compilation.elements[part.name] = element
     names = compilation.space.names[compilation.space.robot_slices[number]]
@@ -120,8 +122,9 @@ def _add_geoms(
     place: Element, part: Part, compilation: Compilation, *, obstacle: bool, color: tuple[float, ...] | None = None
 ) -> None:
     assets, owners, primitives = compilation.assets, compilation.owners, compilation.options.primitives
-    add_visual(place, part, assets, color)
-    add_collision(place, part, assets, obstacle=obstacle, primitives=primitives, owners=owners)
+    center = np.zeros(3) if obstacle else np.array(part.mesh.center)
+    add_visual(place, part, assets, center, color)
+    add_collision(place, part, assets, center, obstacle=obstacle, primitives=primitives, owners=owners)
 
 
 def _add_inertial(element: Element, inertial: Inertial) -> None:

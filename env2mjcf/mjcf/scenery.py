@@ -106,6 +106,9 @@ def add_settings(root: Element, assembly: Assembly, pairs: PairTable, options: O
         ],
     )
     option = add(root, "option", timestep=number(step), gravity=numbers(gravity), integrator="implicitfast")
+    if assembly.extent < 1:
+        # MuJoCo's is absolute: a millionth of a metre, which is here one of the extent.
+        option.set("ccd_tolerance", number(float(f"{1e-6 * assembly.extent:.0e}")))
     add(option, "flag", filterparent="disable")
     asked = memory(assembly, pairs, options)
     if asked:
@@ -154,14 +157,20 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
     add(world, "camera", name="overview", **_camera(center, extent))
     if options.ground:
         # Slightly below the lowest point, so that nothing starts in contact with it.
-        pos = numbers((center[0], center[1], assembly.lower[2] - 1e-3 * extent))
+        pos = numbers((center[0], center[1], _lowest(assembly) - 1e-3 * extent))
         size = numbers((extent, extent, extent / 20))
         add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size)
-    boundary = assembly.environment.boundary
+    boundary = assembly.boundary
     if boundary is not None and options.boundary == "visual":
         add_wires(world, boundary, assembly)
     elif boundary is not None and options.boundary == "solid":
         add_walls(world, boundary, assembly)
+
+
+def _lowest(assembly: Assembly) -> float:
+    """Return the lowest height of any vertex at home, of robots far away, too."""
+    heights = [float((p.used_vertices @ p.pose[2, :3]).min() + p.pose[2, 3]) for p in assembly.links]
+    return min(float(assembly.lower[2]), *heights) if any(assembly.origin) and heights else float(assembly.lower[2])
 
 
 def _camera(center: Array, extent: float) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from .environment import Connection, Environment, JointType, MultiBody, Pose, SMAShape
+from .environment import Boundary, Connection, Environment, JointType, MultiBody, Pose, SMAShape
 
 
 def scaled(environment: Environment, factor: float) -> Environment:
@@ -29,6 +29,15 @@ def scaled(environment: Environment, factor: float) -> Environment:
         boundary=boundary,
         resolution=resolution,
     )
+
+
+def moved_boundary(boundary: Boundary, origin: tuple[float, float, float]) -> Boundary:
+    """Return a boundary about another origin."""
+    if not any(origin):
+        return boundary
+    corners = {"lower": boundary.lower, "upper": boundary.upper, "center": boundary.center}
+    moved = {k: tuple(c - o for c, o in zip(v, origin, strict=False)) for k, v in corners.items()}
+    return dataclasses.replace(boundary, **moved)
 
 
 def _scaled_multibody(multibody: MultiBody, factor: float) -> MultiBody:

@@ -87,7 +87,7 @@ def _crowd_at_home(scene: Scene) -> int:
     compiled = scene.compiled
     parts = {p.name: p for p in compiled.assembly.parts()}
     poses = dict(zip(scene.link_names, scene.link_poses(scene.space.home), strict=True))
-    poses |= {p.name: p.pose for p in compiled.assembly.obstacles}
+    poses |= dict(zip(scene.obstacle_names, scene.obstacle_poses(), strict=True))
     number = {name: i for i, name in enumerate(poses)}
     places = np.array([pose[:3, 3] for pose in poses.values()]).reshape(-1, 3)
     radii = np.array([parts[name].radius for name in poses])

@@ -29,7 +29,7 @@ from ..options import Engine
 from ..pipeline import Compiled
 from ..report import Report, report
 from ..system.locks import Lock
-from ..transforms import Array, real_array
+from ..transforms import Array, real_array, translated
 from .mujoco_model import load_spec
 
 _ENGINES = get_args(Engine)
@@ -140,8 +140,16 @@ class Scene:
 
     @property
     def extent(self) -> float:
-        """Diagonal of the bounding box of all bodies at home, in metres: the unit of every tolerance."""
+        """Diagonal of the bounding box of all bodies at home, in metres: the unit of every tolerance.
+
+        A robot that travels and is at home far from all else counts by its size, not by its place.
+        """
         return self._compiled.assembly.extent
+
+    @property
+    def origin(self) -> Array:
+        """Where the origin of `model` and `data` lies in the file's frame, which q and poses are in: (3,), metres."""
+        return np.array(self._compiled.assembly.origin)
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -219,7 +227,8 @@ class Scene:
 
     def obstacle_poses(self) -> Array:
         """Return the world poses of all obstacles, (m, 4, 4)."""
-        return np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
+        poses = np.array([p.pose for p in self._compiled.assembly.obstacles]).reshape(-1, 4, 4)
+        return translated(poses, self._compiled.assembly.origin)
 
     def loop_error(self, q: ArrayLike) -> float | Array:
         """Return how far the worst loop is from closed, in metres: a float, or (n,) floats; 0.0 without loops.

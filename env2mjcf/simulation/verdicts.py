@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.containment import BoundaryTest
-from ..contact.types import Contact, Reason, Verdict, deepest
+from ..contact.types import Contact, Reason, Verdict, deepest, moved
 from ..options import whole
-from ..transforms import Array
+from ..transforms import Array, translated
 from .scene import Scene
 
 
@@ -41,8 +41,7 @@ class Verdicts:
     ) -> None:
         self._scene, self._q, self.labels = scene, q, labels
         self._placed = np.zeros(len(q), dtype=bool) if fits is None or poses is None else ~fits
-        assembly = scene.compiled.assembly
-        self._boundary = BoundaryTest(assembly.environment.boundary, assembly.links)
+        self._boundary = BoundaryTest(scene.compiled.assembly)
         self.in_limits = scene.space.within_limits(q)
         self.in_collision = np.asarray(scene.in_collision(q, progress=True))
         self._poses = scene.link_poses(q)
@@ -50,7 +49,7 @@ class Verdicts:
             self._poses[self._placed] = poses[self._placed]
             self.in_limits[self._placed] = True
             self.in_collision[self._placed] = [bool(scene.contacts_of_poses(p)) for p in poses[self._placed]]
-        self.inside = self._boundary.inside(self._poses)
+        self.inside = self._boundary.inside(translated(self._poses, -scene.origin))
         self.valid = self.in_limits & self.inside & ~self.in_collision
 
     def verdict(self, index: int) -> Verdict:
@@ -59,7 +58,9 @@ class Verdicts:
         if self.valid[index]:
             return Verdict(q, ())
         if self._placed[index]:
-            return Verdict(q, (*deepest(self._scene.contacts_of_poses(poses)), *self._boundary.outside(poses)))
+            origin = self._scene.origin
+            outside = moved(self._boundary.outside(translated(poses, -origin)), origin)
+            return Verdict(q, (*deepest(self._scene.contacts_of_poses(poses)), *outside))
         return self._scene.explain(q)
 
 

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from ..geometry.assembly import Part
+from ..geometry.mesh import FAR
 from ..kinematics.tree import DofKind
 from ..mjcf.scenery import boundary_lines
 from ..options import whole
@@ -158,7 +159,7 @@ def _views(shot: Shot, points: Array) -> list[Viewpoint]:
 
 def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path) -> dict[str, Any]:
     scene, assembly = shot.scene, shot.scene.compiled.assembly
-    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    center = (points.min(axis=0) + points.max(axis=0)) / 2 - scene.origin
     geoms = {p.name: scene.model.geom(f"{p.name}:visual").id for p in assembly.parts()}
     hidden = [] if shot.only is None else [g for name, g in geoms.items() if name not in shot.only]
     return {
@@ -167,14 +168,14 @@ def _request(shot: Shot, views: Sequence[Viewpoint], points: Array, model: Path)
         "field_of_view": FIELD_OF_VIEW,
         "center": center.tolist(),
         "extent": max(_diagonal(points), 1e-9),
-        "cameras": [{"position": v.position, "forward": v.forward} for v in views],
+        "cameras": [{"position": (v.position - scene.origin).tolist(), "forward": v.forward} for v in views],
         "watched": [geoms[name] for name in _watched(shot)],
         "obstacles": [geoms[p.name] for p in (*assembly.obstacles, *assembly.surfaces)],
         "hidden": hidden,
         "see_through": shot.see_through,
         "segmentation": shot.segmentation,
         "ghosts": scene.space.qpos(shot.ghosts).tolist() if len(shot.ghosts) else [],
-        "marks": [mark.described() for mark in (*_boundary_marks(scene), *shot.marks)],
+        "marks": [_described(mark, scene) for mark in (*_boundary_marks(scene), *shot.marks)],
         "frames": [_frame(shot, frame, geoms) for frame in shot.frames],
     }
 
@@ -192,7 +193,13 @@ def _frame(shot: Shot, frame: Frame, geoms: Mapping[str, int]) -> dict[str, Any]
         tinted = (1 - _TINT) * own[:3] + _TINT * np.array(BAD[:3])
         tints.append((geoms[name], [*tinted.tolist(), float(own[3])]))
     qpos = shot.scene.space.qpos(frame.q).tolist()
-    return {"qpos": qpos, "tints": tints, "marks": [mark.described() for mark in frame.marks]}
+    return {"qpos": qpos, "tints": tints, "marks": [_described(mark, shot.scene) for mark in frame.marks]}
+
+
+def _described(mark: Mark, scene: Scene) -> dict[str, Any]:
+    """Return a mark in terms of JSON, about the origin of the model."""
+    described = mark.described()
+    return {**described, "points": (np.reshape(described["points"], (-1, 3)) - scene.origin).tolist()}
 
 
 def _is_planar(scene: Scene) -> bool:
@@ -203,35 +210,45 @@ def _is_planar(scene: Scene) -> bool:
 
 
 def _boundary_marks(scene: Scene) -> list[Mark]:
-    boundary = scene.compiled.assembly.environment.boundary
+    boundary = scene.compiled.assembly.boundary
     # One that is asked for is part of the model.
     if boundary is None or scene.compiled.options.boundary is not None:
         return []
     lines = boundary_lines(boundary, scene.compiled.assembly)
-    return [Polyline(np.array(line), WIRE, width=1.5) for line in lines]
+    return [Polyline(np.array(line) + scene.origin, WIRE, width=1.5) for line in lines]
 
 
 def _in_view(shot: Shot) -> Array:
     """Return the points that the camera must see, (n, 3)."""
     assembly = shot.scene.compiled.assembly
-    points = [_moved(_vertices(p), p.pose[None]) for p in (*assembly.obstacles, *assembly.surfaces)]
+    fixed = (*assembly.obstacles, *assembly.surfaces)
+    points = [_moved(_vertices(p), p.pose[None]) + assembly.origin for p in fixed]
     rows = np.stack([frame.q for frame in shot.frames])
     rows = np.concatenate([rows, shot.ghosts]) if len(shot.ghosts) else rows
     poses = shot.scene.link_poses(rows)
     shape = _vertices if len(rows) <= _FEW else _box
-    points += [_moved(shape(p), poses[:, i]) for i, p in enumerate(assembly.links)]
+    points += [_near(_moved(shape(p), poses[:, i]), shot.scene) for i, p in enumerate(assembly.links)]
     points += [np.asarray(mark.points, dtype=np.float64).reshape(-1, 3) for mark in shot.marks]
     bodies = np.concatenate([np.zeros((0, 3)), *points])
     if not len(bodies):
-        bodies = np.array([assembly.lower, assembly.upper])
+        bodies = np.array([assembly.lower, assembly.upper]) + assembly.origin
     wires = np.concatenate([np.zeros((0, 3)), *(np.array(mark.points) for mark in _boundary_marks(shot.scene))])
     near = len(wires) and _diagonal(wires) < _FAR_BOUNDARY * _diagonal(bodies)
     return np.concatenate([bodies, wires]) if near else bodies
 
 
+def _near(points: Array, scene: Scene) -> Array:
+    """Return points, (n, 3), without those of robots whose place, far from all else, does not count in the extent."""
+    assembly = scene.compiled.assembly
+    away = np.linalg.norm(
+        points - np.clip(points, *(np.array([assembly.lower, assembly.upper]) + assembly.origin)), axis=1
+    )
+    return points[away <= FAR * assembly.extent]
+
+
 def _vertices(part: Part) -> Array:
     """Return the vertices that a body's triangles use, (n, 3), in its own frame."""
-    return part.mesh.used_vertices
+    return part.used_vertices
 
 
 def _box(part: Part) -> Array:

@@ -27,7 +27,7 @@ def reference_points(scene: Scene, q: ArrayLike) -> Array:
     first = 0
     for robot in scene.compiled.assembly.robots:
         i = 0 if any(d.connection is None for d in robot.kinematics.dofs) else len(robot.links) - 1
-        used = robot.links[i].mesh.used_vertices
+        used = robot.links[i].used_vertices
         middle = (used.min(axis=0) + used.max(axis=0)) / 2
         own = poses[:, first + i]
         points.append(own[:, :3, :3] @ middle + own[:, :3, 3])
@@ -63,7 +63,7 @@ def lengths(scene: Scene, rows: Array) -> Array:
     poses = scene.link_poses(rows)
     links = scene.compiled.assembly.links
     for i, part in enumerate(links):
-        used = part.mesh.used_vertices
+        used = part.used_vertices
         for corner in box_corners(used.min(axis=0), used.max(axis=0)):
             way = poses[:, i, :3, :3] @ corner + poses[:, i, :3, 3]
             moved = np.maximum(moved, np.linalg.norm(np.diff(way, axis=0), axis=1))

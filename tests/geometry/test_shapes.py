@@ -185,11 +185,15 @@ def test_pieces_too_small_for_mujoco_are_reported() -> None:
         collision_shape(micro, analyse(micro), "surface", 1e-9, log)
     assert error.value.code == "GEO241"
     speck = joined(moved(tetrahedron(), np.eye(3) * 3e-8), channel(1e-2))
-    shape = collision_shape(speck, analyse(speck), "surface", 2e-9, log)
+    shape = collision_shape(speck, analyse(speck), "surface", 3e-8, log)
     assert [d.code for d in log] == ["GEO241"]
     assert all(d.code in CATALOGUE for d in log)
+    assert shape.omitted_length == pytest.approx(np.sqrt(3) * 3e-8)
     assert shape.omitted_area == pytest.approx((1.5 + np.sqrt(3) / 2) * 9e-16, rel=1e-6)
     assert compiled(shape.pieces).nmesh == 14
+    # What is longer than verdicts may be off would leave a hole in them.
+    with pytest.raises(GeometryError, match=r"up to 5\.2e-08 m long"):
+        collision_shape(speck, analyse(speck), "surface", 2e-8, DiagnosticLog())
 
 
 SIZES = (1.0, 100.0)  # a mesh that is the whole scene, and one in a scene a hundred times as large

@@ -13,8 +13,8 @@ from ...geometry.topology import Floats, Ints
 from ...kinematics.space import ConfigurationSpace
 from ...model.environment import Boundary
 from ...pairs import Pair
-from ...transforms import inverse, transform
-from ..containment import ROUNDING
+from ...transforms import inverse, shifted, transform
+from ..containment import boundary_slack
 from ..surfaces import Surfaces
 from .motions import Motions
 from .tables import LANES, BoundaryKind, Tables, packed
@@ -37,7 +37,7 @@ def scene_tables(
     motions = Motions()
     steps: list[int] = []
     for robot, columns in zip(assembly.robots, space.robot_slices, strict=True):
-        frames = [shapes.frame(n) for n in robot.names]
+        frames = [shifted(np.eye(4), p.mesh.center) @ shapes.frame(p.name) for p in robot.links]
         steps += motions.add(robot.kinematics, columns.start, frames)
     obstacles = _Obstacles(assembly, shapes)
     number = {p.name: i for i, p in enumerate(parts)}
@@ -48,7 +48,7 @@ def scene_tables(
     vertices = [_into(shapes.frame(p.name), p.mesh.used_vertices) for p in parts]
     first = np.cumsum([0, *map(len, vertices)])
     constants, of_steps = motions.arrays()
-    kind, bounds = _bounds(assembly.environment.boundary)
+    kind, bounds = _bounds(assembly.boundary, boundary_slack(assembly))
     rows, halves, children = shapes.rows()
     tables = Tables(
         steps=of_steps,
@@ -73,19 +73,18 @@ def scene_tables(
     return packed(tables)
 
 
-def _bounds(boundary: Boundary | None) -> tuple[BoundaryKind, Floats]:
+def _bounds(boundary: Boundary | None, slack: float) -> tuple[BoundaryKind, Floats]:
     """Return what links must stay within, as `Tables.boundary` has it, with room for rounding."""
     bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
     if boundary is None:
         return BoundaryKind.NONE, bounds
     if boundary.lower:
         axes = len(boundary.lower)
-        slack = ROUNDING * float(np.max(np.abs([boundary.lower, boundary.upper])))
         bounds[0, :axes], bounds[1, :axes] = np.array(boundary.lower) - slack, np.array(boundary.upper) + slack
         return BoundaryKind.BOX, bounds
     bounds[:] = 0.0
     bounds[0, : len(boundary.center)] = boundary.center
-    bounds[1, :2] = boundary.radius * (1 + ROUNDING), len(boundary.center)
+    bounds[1, :2] = boundary.radius + slack, len(boundary.center)
     return BoundaryKind.BALL, bounds
 
 
@@ -155,8 +154,11 @@ class _Obstacles:
     def __init__(self, assembly: Assembly, shapes: _Shapes) -> None:
         self._names = [p.name for p in assembly.obstacles]
         self.shapes = [shapes.number(n) for n in self._names]
-        self.poses = [p.pose @ shapes.frame(p.name) for p in assembly.obstacles]
-        corners = [p.analysis.vertices @ p.pose[:3, :3].T + p.pose[:3, 3] for p in assembly.obstacles]
+        places = [p.mesh_pose for p in assembly.obstacles]
+        self.poses = [m @ shapes.frame(p.name) for p, m in zip(assembly.obstacles, places, strict=True)]
+        corners = [
+            p.analysis.vertices @ m[:3, :3].T + m[:3, 3] for p, m in zip(assembly.obstacles, places, strict=True)
+        ]
         self._low = np.array([c.min(axis=0) for c in corners]).reshape(-1, 3)
         self._high = np.array([c.max(axis=0) for c in corners]).reshape(-1, 3)
         self._roots: dict[frozenset[str], int] = {frozenset(): -1}

@@ -11,7 +11,7 @@ from ...geometry.topology import Floats, Ints
 from ...kinematics.forward import RobotKinematics
 from ...kinematics.tree import POSITIONS, ROTATIONS, DofKind
 from ...model.environment import BaseKind, DHForm
-from ...transforms import dh_matrix, pose_matrix
+from ...transforms import dh_matrix, pose_matrix, transform
 
 WORLD = -1
 """The parent of a step that begins at the origin; the column of a number that is zero."""
@@ -25,7 +25,7 @@ class Motion(IntEnum):
     TURN_X = 2
     SLIDE_Z = 3
     BASE = 4
-    """Rz Ry Rx and a translation, in the world."""
+    """Rz Ry Rx and a translation, in the world; the constant is a translation before them."""
 
 
 class Motions:
@@ -82,9 +82,9 @@ class Motions:
         self, robot: RobotKinematics, body: int, columns: dict[tuple[int | None, int, DofKind], int]
     ) -> tuple[int, Floats]:
         if robot.tree.bases[body] is BaseKind.FIXED:
-            return WORLD, pose_matrix(robot.multibody.bodies[body].pose)
+            return WORLD, robot.base_pose(body, np.zeros(robot.dim))
         own = tuple(columns.get((None, body, kind), WORLD) for kind in POSITIONS + ROTATIONS)
-        return self._add(WORLD, np.eye(4), Motion.BASE, own), np.eye(4)
+        return self._add(WORLD, transform(np.eye(3), -np.array(robot.origin)), Motion.BASE, own), np.eye(4)
 
 
 def _elements(

@@ -11,7 +11,7 @@ from ...contact.types import Contact
 from ...geometry.assembly import Assembly, Part
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
-from ...transforms import Array, quaternion_from_matrix
+from ...transforms import Array, quaternion_from_matrix, translated
 from ..cameras import FIELD_OF_VIEW, box_corners, fitted, named_direction
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ class WebScene:
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._server = server
         self._extent = scene.extent
+        # Pages know single precision only: they show the scene about its own origin.
+        self._origin = scene.origin
         assembly = scene.compiled.assembly
         self._link_names = scene.link_names
         fixed = (*assembly.obstacles, *assembly.surfaces)
@@ -55,7 +57,7 @@ class WebScene:
     def place(self, poses: Array) -> None:
         """Put the links at their world poses, (nlinks, 4, 4)."""
         for name, pose in zip(self._link_names, poses, strict=True):
-            _place(self._meshes[name], pose)
+            _place(self._meshes[name], translated(pose, -self._origin))
 
     def mark(self, contacts: Sequence[Contact]) -> None:
         """Tint the bodies that touch, and show where they do, with normals from the link to the other body."""
@@ -66,7 +68,7 @@ class WebScene:
         if not contacts:
             self._server.scene.remove_by_name("/contacts")
             return
-        places = np.array([c.position for c in contacts])
+        places = np.array([c.position for c in contacts]) - self._origin
         ends = places + self._extent * _NORMAL_LENGTH * np.array([c.normal for c in contacts])
         self._add_spheres("/contacts/places", places)
         radius = self._extent * _MARK_RADIUS
@@ -85,7 +87,7 @@ class WebScene:
         for i, points in enumerate(lines):
             if not np.ptp(points, axis=0).any():
                 continue
-            segments = np.stack([points[:-1], points[1:]], axis=1)
+            segments = np.stack([points[:-1], points[1:]], axis=1) - self._origin
             self._server.scene.add_line_segments(
                 f"/trail/{i}", segments, _TRAIL, thickness=2.5, thickness_units="screen"
             )
@@ -94,7 +96,7 @@ class WebScene:
         # Names of files stay out of the tree of the page, in which a slash means something.
         name, mesh, colour = f"/bodies/{index}", part.mesh, self._colours[part.name]
         return self._server.scene.add_mesh_simple(
-            name, mesh.vertices, mesh.faces, color=colour, flat_shading=True, side="double"
+            name, mesh.vertices + mesh.center, mesh.faces, color=colour, flat_shading=True, side="double"
         )
 
     def _add_spheres(self, name: str, places: Array) -> None:
@@ -157,8 +159,8 @@ def set_stage(server: viser.ViserServer, scene: Scene, rows: Array) -> None:
     server.scene.set_background_image(np.repeat(gradient, 2, axis=1), format="png")
     if scene.compiled.options.ground:
         _add_ground(server, assembly)
-    if assembly.environment.boundary is not None:
-        lines = np.array(boundary_lines(assembly.environment.boundary, assembly))
+    if assembly.boundary is not None:
+        lines = np.array(boundary_lines(assembly.boundary, assembly))
         server.scene.add_line_segments("/boundary", lines, _WIRE, thickness=1.2, thickness_units="screen")
 
 
@@ -197,13 +199,14 @@ def _seen(scene: Scene, rows: Array) -> tuple[Array, Array]:
     assembly = scene.compiled.assembly
     lower, upper = assembly.lower, assembly.upper
     if len(rows) and scene.link_names:
-        poses = scene.link_poses(rows)
+        poses = translated(scene.link_poses(rows), -scene.origin)
         for i, part in enumerate(assembly.links):
-            corners = box_corners(part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0))
+            used = part.mesh.vertices + part.mesh.center
+            corners = box_corners(used.min(axis=0), used.max(axis=0))
             world = np.einsum("nij,cj->nci", poses[:, i, :3, :3], corners) + poses[:, i, None, :3, 3]
             lower, upper = np.minimum(lower, world.min(axis=(0, 1))), np.maximum(upper, world.max(axis=(0, 1)))
-    if assembly.environment.boundary is not None:
-        wires = np.array(boundary_lines(assembly.environment.boundary, assembly)).reshape(-1, 3)
+    if assembly.boundary is not None:
+        wires = np.array(boundary_lines(assembly.boundary, assembly)).reshape(-1, 3)
         low, high = np.minimum(lower, wires.min(axis=0)), np.maximum(upper, wires.max(axis=0))
         if np.linalg.norm(high - low) <= _BOUNDARY_SEEN * np.linalg.norm(upper - lower):
             return low, high

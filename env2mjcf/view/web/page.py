@@ -8,7 +8,7 @@ from __future__ import annotations
 import html
 from typing import TYPE_CHECKING, Protocol
 
-from ...contact.types import Verdict
+from ...contact.types import Verdict, short
 from ...errors import one_line, robots_named
 from ...kinematics.space import ConfigurationSpace
 from ...simulation.scene import Query, Scene
@@ -224,7 +224,7 @@ def reasons(verdict: Verdict, space: ConfigurationSpace, looking: bool = False) 
         items.append(f"<b>{as_text(c.link)}</b> and <b>{as_text(c.other)}</b> {_dim(f'({c.kind})')} {c.depth}")
     numbers, lower, upper = (space.in_file_units(v) for v in (verdict.q, space.lower, space.upper))
     for i in map(space.names.index, (limit.name for limit in verdict.limits)):
-        text = f"is {numbers[i]:.6g}; limits {lower[i]:.6g} to {upper[i]:.6g}"
+        text = f"is {short(numbers[i])}; limits {short(lower[i])} to {short(upper[i])}"
         items.append(f"<b>{as_text(space.names[i])}</b> {text}")
     items += [f"<b>{as_text(name)}</b> reaches outside the boundary" for name in verdict.outside]
     if len(items) > _LISTED:

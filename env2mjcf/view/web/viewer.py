@@ -174,10 +174,11 @@ class Viewer:
 
 def _is_enclosed(scene: Scene, q: Array) -> bool:
     """Return whether the box of an obstacle holds a whole robot, which might not be seen then."""
-    places = scene.link_poses(q)[:, :3, 3]
+    places = scene.link_poses(q)[:, :3, 3] - scene.origin
     boxes: list[tuple[Array, Array]] = []
     for part in scene.compiled.assembly.obstacles:
-        world = part.mesh.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]
+        pose = part.mesh_pose
+        world = part.mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
         boxes.append((world.min(axis=0), world.max(axis=0)))
     return len(places) > 0 and any(bool(np.all((places > low) & (places < high))) for low, high in boxes)
 

@@ -96,10 +96,10 @@ def place(tables: Tables, q: Any, frames: Any) -> None:
         step = tables.steps[i]
         frame = frames[i]
         motion = step[1]
-        if motion == _BASE:
-            _place_base(step, q, frame)
-            continue
         constant = tables.constants[i]
+        if motion == _BASE:
+            _place_base(step, constant, q, frame)
+            continue
         if step[0] < 0:
             for k in range(12):
                 frame[k] = constant[k]
@@ -135,10 +135,10 @@ def _turn(frame: Any, i: int, j: int, angle: float) -> None:
 
 
 @compiled
-def _place_base(step: Any, q: Any, frame: Any) -> None:
+def _place_base(step: Any, constant: Any, q: Any, frame: Any) -> None:
     """Translate and turn by Rz Ry Rx."""
     for k in range(3):
-        frame[4 * k + 3] = q[step[2 + k]] if step[2 + k] >= 0 else 0.0
+        frame[4 * k + 3] = constant[4 * k + 3] + (q[step[2 + k]] if step[2 + k] >= 0 else 0.0)
     sx, cx = _sine_and_cosine(q, step[5])
     sy, cy = _sine_and_cosine(q, step[6])
     sz, cz = _sine_and_cosine(q, step[7])
