@@ -344,7 +344,7 @@ class DiagnosticLog:
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
         """Add findings that an earlier stage has already judged."""
         for diagnostic in diagnostics:
-            self._add(diagnostic, diagnostic.times == 1 and self.keeps(diagnostic.code, diagnostic.severity))
+            self.add(diagnostic, diagnostic.times == 1 and self.keeps(diagnostic.code, diagnostic.severity))
 
     def info(self, code: str, subject: str, message: str, *, hint: str = "", span: Span | None = None) -> None:
         """Record something worth knowing that is not a fault."""
@@ -365,9 +365,10 @@ class DiagnosticLog:
         if key in self._others:
             self._counts[key] += 1
         else:
-            self._add(Diagnostic(code, severity, subject, message, hint, span), self.keeps(code, severity))
+            self.add(Diagnostic(code, severity, subject, message, hint, span), self.keeps(code, severity))
 
-    def _add(self, diagnostic: Diagnostic, kept: bool) -> None:
+    def add(self, diagnostic: Diagnostic, kept: bool) -> None:
+        """Add a finding to those that are kept, or only count it."""
         key = diagnostic.code, diagnostic.severity
         self._counts[key] += diagnostic.times
         if kept:
@@ -383,12 +384,14 @@ def few(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """
     listed = list(diagnostics)
     end = [listed.pop()] if listed and listed[-1].severity is Severity.ERROR else []
+    counts: Counter[tuple[str, Severity]] = Counter()
     log, left = DiagnosticLog(), _SHOWN_BYTES - sum(map(_size, end))
     for diagnostic in listed:
-        shown = diagnostic.times == 1 and left > 0 and log._counts[diagnostic.code, diagnostic.severity] < _SHOWN
+        shown = diagnostic.times == 1 and left > 0 and counts[diagnostic.code, diagnostic.severity] < _SHOWN
         if shown:
             left -= _size(diagnostic)
-        log._add(diagnostic, shown)
+        counts[diagnostic.code, diagnostic.severity] += 1
+        log.add(diagnostic, shown)
     return (*log, *end)
 
 

@@ -236,3 +236,52 @@ def test_reading_does_not_import_mujoco(tmp_path: Path) -> None:
 
     code = f"import sys, env2mjcf; env2mjcf.read({os.fspath(SEED)!r}); sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names that are not UTF-8")
+@pytest.mark.parametrize("out", [b"out\xff", b"\xfe/deep\xff", b"scene\xff.xml"])
+def test_a_folder_may_have_a_name_that_is_not_utf_8(out: bytes, tmp_path: Path) -> None:
+    target = tmp_path / os.fsdecode(out)
+    result = env2mjcf.convert(SEED, target)
+    assert files(result.xml.parent).keys() >= {result.xml.name, *(f"assets/{a.name}" for a in result.assets)}
+    assert mujoco.MjModel.from_xml_path(os.fsencode(result.xml)).nbody == 5  # pyright: ignore[reportArgumentType]
+    assert env2mjcf.convert(SEED, target).xml == result.xml
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names that are not UTF-8")
+def test_so_may_the_scene_its_folder_and_its_query(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"in\xff")
+    shutil.copytree(SEED.parent, folder)
+    scene, query = (folder / os.fsdecode(b"s\xfe" + end) for end in (b".env", b".query"))
+    (folder / "seed.env").rename(scene)
+    (folder / "seed.query").rename(query)
+    result = env2mjcf.convert(scene, tmp_path / "out", query=query)
+    assert result.xml.name == "s_.xml"
+    assert mujoco.MjModel.from_xml_path(str(result.xml)).nkey >= 2
+
+
+@pytest.mark.parametrize("there", [[], ["deep"], ["deep", "deep/out"], ["deep", "deep/out", "deep/out/assets"]])
+def test_one_that_fails_leaves_no_folder_behind(
+    there: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in there:
+        (tmp_path / folder).mkdir()
+
+    def refuse(*_: object) -> None:
+        raise TypeError("refused")
+
+    monkeypatch.setattr("env2mjcf.conversion.load_file", refuse)
+    with pytest.raises(TypeError, match="refused"):
+        env2mjcf.convert(SEED, tmp_path / "deep/out")
+    assert sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*")) == there
+
+
+def test_it_leaves_what_others_have_put_there_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        (tmp_path / "out/notes.txt").write_text("mine")
+        raise TypeError("refused")
+
+    monkeypatch.setattr("env2mjcf.conversion.load_file", refuse)
+    with pytest.raises(TypeError, match="refused"):
+        env2mjcf.convert(SEED, tmp_path / "out")
+    assert files(tmp_path) == {"out/notes.txt": b"mine"}

@@ -263,7 +263,7 @@ class TestProgram:
         (line,) = out.splitlines()
         assert line.startswith("::error file=a.env,line=6,col=1,endColumn=7,title=env2mjcf GEO201::there is no mesh")
         assert "%0Ahint: " in line
-        assert err == "1 file: 1 error, 0 warnings, 0 notes\n"
+        assert err == "GEO201 1\n1 file: 1 error, 0 warnings, 0 notes\n"
 
     def test_an_empty_folder_is_said_to_be_empty(self, folder, run):
         status, _, err = run(".")

@@ -59,7 +59,7 @@ def missing_meshes(rng: random.Random, n: int) -> Made:
 
 
 def huge_words(rng: random.Random, n: int) -> Made:
-    text = f"{BOX}1\n{ROBOT}".split(" ")
+    text: list[str] = f"{BOX}1\n{ROBOT}".split(" ")
     text[rng.randrange(len(text))] = word(rng, 2) * (50 * n)
     return "hostile.env", " ".join(text)
 

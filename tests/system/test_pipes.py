@@ -49,6 +49,52 @@ def test_only_regular_files_are_opened(tmp_path: Path) -> None:
         open_regular(tmp_path)
 
 
+VIEWS = [
+    path for path in ("/proc/kmsg", "/proc/self/mem", "/proc/self/maps", "/sys/kernel/notes") if os.path.exists(path)
+]
+
+
+@pytest.mark.parametrize("path", [*VIEWS, "/dev/zero", "/dev/null", "/dev/random"])
+def test_views_of_the_system_and_devices_are_not_opened(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To read /proc/kmsg waits for the kernel, and takes its messages from those who log them."""
+    (tmp_path / "link.env").symlink_to(path)
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    monkeypatch.setattr("builtins.open", lambda *_, **__: pytest.fail("it is opened"))
+    monkeypatch.setattr(os, "fstat", lambda _: os.stat(scene))  # it is not the standard input
+    for name in (path, tmp_path / "link.env"):
+        for or_pipe in (False, True):
+            with pytest.raises(NoRegularFileError):
+                open_regular(name, or_pipe=or_pipe)
+
+
+@pytest.mark.parametrize("path", [*VIEWS[:1], "/dev/zero"])
+def test_nobody_waits_for_them(path: str, tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    (tmp_path / "b.xml").symlink_to(path)
+    (tmp_path / "q.npy").symlink_to(path)
+    for words in (
+        ["info", path],
+        ["lint", path],
+        ["lint", tmp_path, "--allow-outside"],
+        ["check", scene, "--query", path],
+        ["info", scene, "--robots", path],
+        ["check", scene, tmp_path / "q.npy"],
+    ):
+        status, said = run(*words)
+        assert status in (1, 3), words
+        assert "it is not a regular file" in said, words
+
+
+def test_what_the_scene_names_is_no_view_of_the_system(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
+    (tmp_path / "cube.g").unlink()
+    (tmp_path / "cube.g").symlink_to(VIEWS[0] if VIEWS else "/dev/zero")
+    status, said = run("info", scene, "--allow-outside")
+    assert (status, "GEO20" in said) == (3, True)
+
+
 @pytest.mark.parametrize("name", ["maze.robot", "maze.env"])
 def test_a_pipe_that_a_problem_names_is_refused(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "maze"

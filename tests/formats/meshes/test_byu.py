@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hypothesis.extra.numpy import arrays
 
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.errors import GeometryError, Severity
+from env2mjcf.formats.meshes import byu
 from env2mjcf.formats.meshes.byu import export_byu, load_byu, read_byu, read_gms, teach
 from env2mjcf.formats.meshes.text import MeshArrays
 from env2mjcf.geometry.mesh import Mesh
@@ -306,3 +308,39 @@ def test_a_bad_gms_file_is_refused_with_its_place(text: str, code: str, place: t
     span = caught.value.span
     assert span is not None
     assert (span.line, span.column) == place
+
+
+class TestGuessesOfColumns:
+    """Files that fit many widths at once: few are tried, so that the time is that of some readings."""
+
+    HEADER = "1\n3\n1\n3\n"
+    TEXTS: ClassVar[dict[str, str]] = {
+        "digits that fit every width": HEADER + ("1" * 2520 + "\n") * 20,
+        "points that do, too": HEADER + (".1111111" * 315 + "\n") * 20,
+        "both": HEADER + ("1" * 2520 + "\n" + ".1111111" * 315 + "\n") * 20,
+        "one number a line": "1\n" * 9000,
+    }
+
+    @pytest.mark.parametrize("text", TEXTS)
+    def test_few_are_tried(self, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        tried: list[int] = []
+        original = byu._read
+        monkeypatch.setattr(byu, "_read", lambda file: tried.append(1) or original(file))
+        with pytest.raises(GeometryError):
+            read_byu(self.TEXTS[text], "x.g", DiagnosticLog(), Limits())
+        assert len(tried) <= 5
+        if text == "one number a line":
+            assert len(tried) == 1
+
+    @pytest.mark.parametrize("integer", [5, 6, 7, 8, 9, 10, 12])
+    @pytest.mark.parametrize("other", [12, 13, 14, 15, 16, 20])
+    @pytest.mark.parametrize("end", ["\n", "\r\n", " \r\n"])
+    def test_every_width_is_found_where_all_numbers_touch(self, integer: int, other: int, end: str) -> None:
+        count = 1000
+        points = [(-1.25 - k % 7, 2.5e-3 * k, -3.0) for k in range(count)]
+        lines = ["".join(f"{n:{integer}d}" for n in (1, count, 1, 3)), f"{1:{integer}d}{1:{integer}d}"]
+        lines += ["".join(f"{x:{other}.{other - 7}E}" for x in point) for point in points]
+        lines.append(f"{1:{integer}d}{2:{integer}d}{-count:{integer}d}")
+        vertices, faces = read_byu(end.join([*lines, ""]), "x.g", DiagnosticLog(), Limits())
+        np.testing.assert_allclose(vertices, points, rtol=10.0 ** (8 - other))
+        assert faces.tolist() == [[0, 1, count - 1]]
