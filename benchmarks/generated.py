@@ -105,7 +105,7 @@ def robots_in_groups(folder: Path, number: int) -> Case:
     problem = ['<Environment filename="scene.env"/>']
     for i, (base, arm) in enumerate(zip(bases, arms, strict=True)):
         sides = rng.uniform(0.3, 1.2, 3)
-        _write_mesh(folder / f"r{i}.g", trimesh.creation.box(sides))
+        write_mesh(folder / f"r{i}.g", trimesh.creation.box(sides))
         robot = [str(1 + arm), f"r{i}.g {base}", *[f"r{i}.g Joint"] * arm, "Connections"]
         half = f"{float(sides[0]) / 2 + 0.05!r} 0 0 0 0 0"
         robot += [str(int(arm)), *["0 1 Revolute -1:1", f"{half}   0 0 0 0   {half}"] * arm]

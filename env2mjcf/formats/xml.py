@@ -10,7 +10,7 @@ from typing import Any, NoReturn, TypeVar
 from lxml import etree
 
 from ..diagnostics import DiagnosticLog
-from ..errors import Diagnostic, Severity, Span, did_you_mean
+from ..errors import Diagnostic, Severity, Span, did_you_mean, enumeration
 from ..limits import Limits
 from .lexer import Scanner
 from .source import Source
@@ -179,8 +179,7 @@ class Node:
                 others[f"<{child.tag}>"] = child
         if others:
             first, one = next(iter(others.values())), len(others) == 1
-            listed = ", ".join(list(others)[:12]) + ", ..." * (len(others) > 12)
-            message = f"{listed} of <{self.tag}> {'is' if one else 'are'} not used"
+            message = f"{enumeration(list(others))} of <{self.tag}> {'is' if one else 'are'} not used"
             hint = did_you_mean(first.tag, known) if one else ""
             self.log.info("ENV307", f"<{first.tag}>", message, hint=hint, span=first.span)
 
@@ -190,12 +189,12 @@ class Node:
         places = self._values() if others else {}
         for name in others:
             span = self.source.span(*places[name]) if name in places else self.span
+            message = f"attribute {name!r} of <{self.tag}> is not used"
             if _PAIR_RULES.fullmatch(name.lower()) and self.tag.lower() != "collisiondetection":
-                message = f"{name!r} of <{self.tag}> is not followed: it counts on <CollisionDetection>"
                 hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
+                message += ": it counts on <CollisionDetection>"
                 self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
             else:
-                message = f"attribute {name!r} of <{self.tag}> is not used"
                 hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
                 self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
 

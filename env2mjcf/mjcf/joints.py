@@ -12,7 +12,8 @@ import numpy as np
 
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import RobotParts
-from ..kinematics.space import ConfigurationSpace, joint_kinds
+from ..kinematics.qpos import joint_kinds
+from ..kinematics.space import ConfigurationSpace
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind
 from ..transforms import inverse

@@ -9,7 +9,8 @@ import numpy as np
 from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import Assembly, Part, RobotParts
 from ..geometry.inertia import Inertial
-from ..kinematics.space import ConfigurationSpace, children_first_to_last
+from ..kinematics.qpos import children_first_to_last
+from ..kinematics.space import ConfigurationSpace
 from ..kinematics.tree import POSITIONS, DofKind, build_tree
 from ..model.environment import Environment
 from ..options import Options

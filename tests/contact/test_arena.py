@@ -115,7 +115,7 @@ def engine_of(scene: env2mjcf.Scene, memory: int) -> MujocoEngine:
     """An engine whose MuJoCo has so many bytes for contacts."""
     spec = scene.spec()
     spec.memory = memory
-    return MujocoEngine(spec.compile(), scene.compiled.document.owners)
+    return MujocoEngine(spec.compile(), scene.compiled.document.owners, scene.extent)
 
 
 def found(engine: MujocoEngine, qpos: np.ndarray) -> list[tuple[str, str, tuple[float, ...]]]:

@@ -159,7 +159,7 @@ def test_rules_about_pairs_count_on_collision_checkers_only(problem: Reader, tmp
     text = f'<MotionPlanning><Problem><Environment filename="scene.env"/>\n{wrong}</Problem></MotionPlanning>'
     scene = env2mjcf.read(write(tmp_path, text, "problem.xml"))
     assert found(scene, "ENV185") == [
-        ("ENV185", f"{name!r} of <Robot> is not followed: it counts on <CollisionDetection>")
+        ("ENV185", f"attribute {name!r} of <Robot> is not used: it counts on <CollisionDetection>")
     ]
     assert codes(scene) == ["ENV185"]
     assert (scene.planner_rules.ignore_self_collision, scene.planner_rules.adjacent_links) == (None, None)

@@ -44,6 +44,7 @@ CHANGING = {
     "env2mjcf.geometry.store._provenance": "a cache: the digest of the geometry code",
     "env2mjcf.geometry.mesh._READERS": "readers of meshes by file ending; filled on import",
     "env2mjcf.planning.planner_space._remembered": "a cache of at most 512 read-only arrays, of 512 numbers at most",
+    "env2mjcf.system.files._views_of_the_system": "a cache: which devices /proc and /sys are",
     "env2mjcf.view.offscreen._backend": "a cache: the GL backend, by what MUJOCO_GL asks for",
     "env2mjcf.testing.assertions._numbered": "numbers of pictures, by the name of the test that failed",
 }
