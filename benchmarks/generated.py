@@ -146,6 +146,25 @@ def _constraints(rng: np.random.Generator, base: tuple[int, int], arm: bool) -> 
     return f"<StartConstraints>{point()}</StartConstraints><GoalConstraints>{goals}</GoalConstraints>"
 
 
+def rounded_solids(folder: Path, number: int) -> Case:
+    """Return a free convex solid among others, turned at random and written in single precision."""
+    folder = folder / f"rounded{number}"
+    folder.mkdir(parents=True, exist_ok=True)
+    rng = np.random.default_rng((SEED, number))
+    solids = {
+        "box": trimesh.creation.box((1, 0.5, 1.5)),
+        "cylinder": trimesh.creation.cylinder(0.4, 1, sections=40),
+        "capsule": trimesh.creation.capsule(1, 0.3, count=[8, 8]),
+        "ball": trimesh.creation.icosphere(2, 0.6),
+    }
+    for name, solid in solids.items():
+        solid.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+        solid.export(folder / f"{name}.stl")
+    robot, *others = *(f"{name}.stl" for name in rng.permutation(list(solids))), "box.stl"
+    placed = [Placed(mesh, rng.uniform(-1.5, 1.5, 3), rng.uniform(-180, 180, 3)) for mesh in others]
+    return scene(folder, folder.name, 18.0, ["1", f"{robot} Volumetric Rotational", "Connections", "0"], placed)
+
+
 def maze_copies(folder: Path, maze: Case, copies: int) -> Case:
     """Return the maze with its walls once, 4 or 16 times, side by side; its meshes stay where they are."""
     lines = maze.path.read_text(encoding="utf-8").splitlines()

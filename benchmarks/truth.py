@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from generated import robots_in_groups, rounded_solids
 from pieces import scene_of_pieces
 from table import Case, corpus_cases
 from triangles import DIRECTIONS, Truth
@@ -68,8 +69,9 @@ def text(results: Sequence[Result], command: str, count: int, engine: str) -> st
             f'`engine="{engine}"`, which is to say {HOW[engine]}. Uniform: half of '
             "them in the whole space, half with the robot's base about the obstacles. Bisected: every point that "
             f"{HALVINGS} halvings between a free and a colliding configuration visit, onto the borders of both truths. "
-            "The scenes called `pieces` are made at random (`benchmarks/pieces.py`): meshes of pieces, some with "
-            "holes, of which it is known which are closed.",
+            "Scenes with a number in their names are made at random: `pieces` of meshes in pieces, some with holes, of "
+            "which it is known which are closed; `rounded` of convex solids in single precision; `groups` of robots "
+            "that move together (`benchmarks/pieces.py`, `benchmarks/generated.py`).",
             "",
             f"The band is {BAND:g} of the scene's extent; numbers before a slash are disagreements in it, after the "
             "slash outside it. A false hit is judged by the distance of the triangles; a false free verdict by the "
@@ -96,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", nargs="*", help="only these; write nothing")
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--pieces", type=int, default=40, help="scenes of random meshes in several pieces, at most")
+    parser.add_argument("--random", type=int, default=40, help="random scenes of each kind")
     chosen = parser.parse_args(arguments)
     folder = os.environ.get("ENV2MJCF_CORPUS")
     if not folder:
@@ -104,9 +106,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     count = 400 if chosen.quick else chosen.count
     done = {}
     with TemporaryDirectory() as made, ProcessPoolExecutor(chosen.processes) as pool:
-        random = [scene_of_pieces(Path(made) / str(i), i) for i in range(chosen.pieces)]
-        known = {case.name: pieces for case, pieces in random}
-        every = [*(c for c in corpus_cases(Path(folder)) if _complete(c)), *(case for case, _ in random)]
+        in_pieces = [scene_of_pieces(Path(made) / str(i), i) for i in range(chosen.random)]
+        known = {case.name: pieces for case, pieces in in_pieces}
+        random = [case for case, _ in in_pieces]
+        random += [make(Path(made), i) for make in (rounded_solids, robots_in_groups) for i in range(chosen.random)]
+        every = [*(c for c in corpus_cases(Path(folder)) if _complete(c)), *random]
         cases = [c for c in every if not chosen.scenes or c.name in chosen.scenes]
         futures = [pool.submit(examine, c, count, chosen.seed, chosen.engine, known.get(c.name)) for c in cases]
         for future in as_completed(futures):
