@@ -20,6 +20,8 @@ _RINGS = 8  # of neighbours whose planes a triangle tries
 _SMOOTHINGS = 3
 _HALVINGS = 5
 _PROBES = 500
+_LEAST_COSINE = 1e-12
+_BEYOND = 5.0  # tolerances that the hull may reach beyond the surface: no more than other pieces do
 _MOST = 200_000_000  # pairs of triangles and facets of the hull that are compared
 # The corners of the four triangles that a triangle is cut into, from its corners.
 _QUARTERS = (
@@ -100,7 +102,8 @@ def concavity(
         smooth = _smoothed(smooth, cover.faces, len(vertices))
         cover.try_directions(rest, smooth[rest])
         cover.try_neighbours(table)
-    return cover.decided()
+    height = cover.decided()
+    return height if cover.beyond_edges(table) <= _BEYOND * tolerance else math.inf
 
 
 class _Cover:
@@ -224,6 +227,21 @@ class _Cover:
         exact = self._supports(normals[chosen], np.full(len(chosen), np.inf), offsets[chosen])[of_triangle.reshape(-1)]
         lowest = np.einsum("pki,pi->pk", triangles, normals[best]).min(axis=1)
         return exact - lowest, deep
+
+    def beyond_edges(self, table: Edges) -> float:
+        """Return how far the hull may reach beyond edges of the surface: far, where a sharp one is dented.
+
+        What lies at most h above two planes at an angle a, and next to their edge, is at most h / cos(a / 2) from it.
+        """
+        first, second, _ = table.neighbours()
+        here, there = first // 3, second // 3
+        # No one plane fits those that were compared with the hull in parts.
+        parted = (self.heights > self._tolerance)[:, None]
+        own = self.areas / np.linalg.norm(self.areas, axis=1, keepdims=True)
+        normals = np.where(parted, own, self._normals)
+        heights = np.minimum(np.maximum(self.heights[here], self.heights[there]), self._tolerance)
+        cosine = np.einsum("ij,ij->i", normals[here], normals[there])
+        return float((heights * np.sqrt(2 / np.maximum(1 + cosine, _LEAST_COSINE))).max(initial=0.0))
 
     @cached_property
     def _hull(self) -> tuple[Floats, Floats] | None:

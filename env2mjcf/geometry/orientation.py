@@ -84,8 +84,8 @@ def encloses_any(vertices: Floats, faces: Ints, points: Floats) -> Bools:
 def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, work: Work) -> Bools:
     """Tell which components of a closed, consistently wound surface are wound inside out, (c,).
 
-    A component of negative volume that lies in no other one is inside out, and everything in it was wound by the same
-    hand; a negative one within another is a cavity.
+    A component of negative volume is a cavity where others fill what is around it. Elsewhere it is inside out, and
+    everything in it was wound by the same hand.
 
     Args:
         vertices: (n, 3).
@@ -100,14 +100,19 @@ def inside_out(vertices: Floats, faces: Ints, component: Ints, volumes: Floats, 
     groups = by_component(faces, component)
     low = np.array([vertices[g.ravel()].min(axis=0) for g in groups])
     high = np.array([vertices[g.ravel()].max(axis=0) for g in groups])
-    for i in np.flatnonzero(volumes < 0):
+    # What is around a component is larger, so that it has been decided before.
+    for i in np.argsort(-np.abs(volumes), kind="stable"):
+        if (volumes[i] < 0) == flipped[i]:
+            continue
         work.spend(len(groups))
         around = np.flatnonzero((low <= low[i]).all(axis=1) & (high >= high[i]).all(axis=1))
-        if any(_within(vertices, groups[j], groups[i : i + 1], work)[0] for j in around if j != i):
+        around = around[[bool(j != i and _within(vertices, groups[j], groups[i : i + 1], work)[0]) for j in around]]
+        if np.where((volumes[around] < 0) == flipped[around], 1, -1).sum() > 0:
             continue
         within = np.flatnonzero((low >= low[i]).all(axis=1) & (high <= high[i]).all(axis=1))
-        flipped[within[_within(vertices, groups[i], [groups[j] for j in within], work)]] = True
-        flipped[i] = True
+        within = within[_within(vertices, groups[i], [groups[j] for j in within], work) & (within != i)]
+        flipped[within] ^= True
+        flipped[i] ^= True
     return flipped
 
 

@@ -18,6 +18,7 @@ from .topology import Bools, Floats, Ints
 from .triangle_search import Jobs, Search
 from .triangle_tree import forest
 
+_NOTHING = 1e-6  # of the volume, which messages give with six digits
 _JOBS = 1024  # pairs of pieces that are looked at together
 _SAMPLES = 4096
 _PAIRS = 4_000_000  # pairs of samples and triangles
@@ -71,14 +72,15 @@ def union(analysis: Analysis, work: Work | None = None) -> Union:
     crossing = meet & kept[a] & kept[b]
     if not crossing.any():
         return found
-    least = analysis.tolerance * analysis.area
+    # In single precision, pieces that touch overlap by rounding.
+    least = _NOTHING * found.volume
     united = _united([pieces[i] for i in np.flatnonzero(kept)], volumes[kept], work)
     if united is not None:
         volume = _volume(united - united.mean(axis=(0, 1)))
         # Pieces that merely touch stay as they are in the file, with manifold3d and without.
         return found if found.volume - volume <= least else Union(united, total, volume, inner, True)
     twice, samples = _twice(pieces, a[crossing], b[crossing], triangles, work)
-    return found if not twice else Union(triangles, total, found.volume - twice, inner, False, samples)
+    return found if twice <= least else Union(triangles, total, found.volume - twice, inner, False, samples)
 
 
 def union_diagnostics(found: Union, log: DiagnosticLog, subject: str, span: Span | None = None) -> None:
@@ -139,7 +141,7 @@ def _meet(pieces: list[Floats], a: Ints, b: Ints, tolerance: float, work: Work) 
         work.spend(COSTLY * int((size[first] + size[second]).sum()))
         count = len(first)
         jobs = Jobs(first, second, np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.arange(count))
-        found = Search(trees, jobs, np.full(count, np.inf), tolerance).run()
+        found = Search(trees, jobs, np.full(count, 2 * tolerance), tolerance).run()
         out[i : i + _JOBS] = found.distance <= tolerance
     return out
 

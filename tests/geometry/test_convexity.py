@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from meshes import Floats, box
+from meshes import Floats, box, moved, rotation
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -238,3 +238,22 @@ def test_a_large_rounded_ball_takes_seconds() -> None:
     began = time.process_time()
     assert concavity(vertices, np.asarray(ball.faces), 2 * SHARE) < SHARE
     assert time.process_time() - began < 30
+
+
+@pytest.mark.parametrize("degrees", [60, 30, 8, 4, 2])
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
+def test_a_dent_in_the_edge_of_a_knife_lets_the_hull_reach_far_beyond_it(degrees: float, share: float) -> None:
+    """A dent of depth d below both sides of a wedge of angle w is d / sin(w / 2) below its edge."""
+    half = np.radians(degrees) / 2
+    tolerance = SHARE * float(np.linalg.norm([2 * np.tan(half), 1, 1]))
+    claimed = share * tolerance / np.sin(half)
+    height = np.array([1, 1 - claimed, 1])
+    rows = [[[-np.tan(half), y, 0], [np.tan(half), y, 0], [0, y, z]] for y, z in zip((0, 0.5, 1), height, strict=True)]
+    sides = [(3 * k + i, 3 * k + j) for k in range(2) for i, j in ((0, 2), (2, 1), (1, 0))]
+    faces = [f for a, b in sides for f in ([a, b, b + 3], [a, b + 3, a + 3])] + [[0, 1, 2], [6, 8, 7]]
+    for turn in (np.eye(3), rotation(3)):
+        mesh = moved(Mesh.from_arrays("knife", np.concatenate(rows), faces), turn)
+        a = analyse(mesh, concave=tolerance)
+        assert a.solid
+        # Half of the band: as far as other pieces leave the surface.
+        assert a.convex is bool(claimed <= 5 * tolerance)

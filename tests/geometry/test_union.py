@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from env2mjcf.geometry import union as module
 from env2mjcf.geometry.analysis import analyse
 from env2mjcf.geometry.inertia import inertial
 from env2mjcf.geometry.mesh import Mesh
-from env2mjcf.geometry.union import Union, union, union_diagnostics
+from env2mjcf.geometry.orientation import winding_numbers
+from env2mjcf.geometry.repair import repaired
+from env2mjcf.geometry.union import Union, available, union, union_diagnostics
 
 BIG = box((4, 4, 4))
 
@@ -131,3 +134,31 @@ def test_a_scene_says_what_its_bodies_weigh(tmp_path: Path) -> None:
     assert "add up to 91, their union has 64" in found.message
     (mesh,) = scene.report.meshes
     assert (mesh.solids, mesh.sheets, mesh.cells) == (2, 0, 2)
+
+
+@pytest.mark.parametrize("signs", list(product((1, -1), repeat=3)))
+def test_three_nested_boxes_fill_what_winding_says_whichever_way_each_is_wound(signs: tuple[int, ...]) -> None:
+    """What is wound against the box around it is a cavity in it; in a cavity there can only be a solid."""
+    boxes = [b if s > 0 else turned(b) for b, s in zip([box((n,) * 3) for n in (6, 4, 2)], signs, strict=True)]
+    expected = 6**3 if signs[0] == signs[1] else 6**3 - 4**3 + 2**3
+    for order in permutations(boxes):
+        mesh = moved(joined(*order), rotation(1))
+        a = repaired(mesh).analysis
+        assert union(a).volume == pytest.approx(expected)
+        assert inertial(mesh, a, 1.0).mass == pytest.approx(expected)
+        probes = np.array([[0, 0, 0], [1.5, 0, 0], [2.5, 0, 0]]) @ rotation(1).T
+        filled = np.abs(winding_numbers(probes, a.vertices, a.enclosing)) > 0.5
+        assert filled @ [8, 64 - 8, 216 - 64] == expected
+
+
+@pytest.mark.parametrize("extra", [True, False])
+def test_boxes_that_touch_in_single_precision_do_not_overlap(extra: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rounding lets them overlap by 1e-7 or so, which is no finding."""
+    monkeypatch.setattr(module, "available", lambda: extra and available())
+    walls = [box((1, 3, 2), (i, 0.3 * i, 0.2 * i)) for i in range(8)]
+    mesh = moved(joined(*walls), rotation(2), (30, 40, 50))
+    rounded = Mesh.from_arrays("m", mesh.vertices.astype(np.float32).astype(np.float64), mesh.faces)
+    log, found = DiagnosticLog(), union(repaired(rounded).analysis)
+    assert found.volume == pytest.approx(8 * 6, rel=1e-5)
+    union_diagnostics(found, log, "m")
+    assert not list(log)
