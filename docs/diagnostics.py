@@ -19,7 +19,8 @@ HEAD = """# Diagnostics
 
 Everything that env2mjcf finds has a code that stays, a severity, a message, and where there is one a place in the file
 and a hint. Information is shown by `env2mjcf info`, `lint` and `--verbose`; warnings always; `strict=True` (`--strict`)
-turns warnings into errors. Written by `docs/diagnostics.py` from `env2mjcf/diagnostics.py`.
+turns warnings into errors. Of each code the first thousand are kept, and one more that counts the others in `times`;
+the program shows ten. Written by `docs/diagnostics.py` from `env2mjcf/diagnostics.py`.
 """
 
 

@@ -17,7 +17,7 @@ class Limits:
 
     Attributes:
         file_bytes: Size of any one input file.
-        bodies: Bodies in a scene.
+        bodies: Bodies in a scene. MuJoCo takes a time that grows with their square: about 20 s for 20,000.
         connections: Connections in a scene.
         mesh_elements: Vertices, and polygon corners, of one mesh.
         name_length: Characters in a file name or label.
@@ -36,7 +36,7 @@ class Limits:
     """
 
     file_bytes: int = 512 * 1024 * 1024
-    bodies: int = 100_000
+    bodies: int = 20_000
     connections: int = 100_000
     mesh_elements: int = 50_000_000
     name_length: int = 4096

@@ -195,9 +195,8 @@ def test_a_missing_file_is_a_file_not_found_error_too(tmp_path: Path, what: str)
     # Texts of an OSError with a number and a name are others: ours tells the code, the place and the hint.
     assert str(error) == str(error.diagnostic)
     again = pickle.loads(pickle.dumps(error))
-    assert (type(again), str(again), again.diagnostics, again.errno) == (
-        type(error), str(error), error.diagnostics, error.errno,
-    )  # fmt: skip
+    assert type(again) is type(error)
+    assert (str(again), again.diagnostics, again.errno) == (str(error), error.diagnostics, error.errno)
 
 
 def test_folders_and_forbidden_files_are_errors_of_python_too(tmp_path: Path) -> None:

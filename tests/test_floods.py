@@ -144,10 +144,13 @@ class TestQuotations:
         text = "/a/path/of/some/length/" + "x" * 200 + "\nand a second line"
         assert abridged(text) == text
 
-    @pytest.mark.parametrize(("text", "expected"), [
-        ("x" * 1_000_000, "x" * 160 + "..." + "x" * 77),
-        ("\n".join(map(str, range(100))), "\n".join(map(str, range(24))) + "\n... and 76 more lines"),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        ("text", "expected"),
+        [
+            ("x" * 1_000_000, "x" * 160 + "..." + "x" * 77),
+            ("\n".join(map(str, range(100))), "\n".join(map(str, range(24))) + "\n... and 76 more lines"),
+        ],
+    )
     def test_keep_their_beginning(self, text: str, expected: str) -> None:
         assert abridged(text) == expected
 

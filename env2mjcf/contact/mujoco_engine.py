@@ -24,9 +24,17 @@ _CCD_TOLERANCE = 1e-6
 
 # What a model measures in metres, besides the positions of slides and free joints.
 _LENGTHS = (
-    "body_pos", "body_ipos", "jnt_pos", "geom_pos", "geom_size", "geom_aabb", "geom_rbound", "bvh_aabb", "mesh_vert",
+    "body_pos",
+    "body_ipos",
+    "jnt_pos",
+    "geom_pos",
+    "geom_size",
+    "geom_aabb",
+    "geom_rbound",
+    "bvh_aabb",
+    "mesh_vert",
     "site_pos",
-)  # fmt: skip
+)
 
 
 class MujocoEngine:

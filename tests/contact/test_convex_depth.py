@@ -53,11 +53,11 @@ def depth_by_all_axes(a: trimesh.Trimesh, b: trimesh.Trimesh) -> float:
     axes = np.concatenate([axes, -axes])
     axes = axes[np.linalg.norm(axes, axis=1) > 1e-9]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    ways = np.concatenate([
-        (b.vertices @ some.T).max(axis=0) - (a.vertices @ some.T).min(axis=0)
+    ways = (
+        float(((b.vertices @ some.T).max(axis=0) - (a.vertices @ some.T).min(axis=0)).min())
         for some in np.array_split(axes, 1 + len(axes) // 20000)
-    ])  # fmt: skip
-    return max(0.0, float(ways.min()))
+    )
+    return max(0.0, min(ways))
 
 
 def corners_of(scene: env2mjcf.Scene, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -294,7 +294,7 @@ def test_a_wrong_count_is_a_warning_and_the_file_is_believed(
 @pytest.mark.parametrize(
     ("old", "new", "code", "message", "hint"),
     [
-        ("Active\n3", "Active\n-3", "ENV110", "the number of bodies is -3; expected 0 to 100000", "how many"),
+        ("Active\n3", "Active\n-3", "ENV110", "the number of bodies is -3; expected 0 to 20000", "how many"),
         ("Active\n3", "Active\n1000000000", "ENV110", "the number of bodies is 1000000000", "Limits(bodies=...)"),
         ("Connection\n2", "Connection\n1000000000", "ENV110", "number of connections is", "Limits(connections=...)"),
         ("20020327\n2", "20020327\n1000000000", "ENV110", "number of multibodies is", "Limits(bodies=...)"),

@@ -366,10 +366,17 @@ def test_what_cannot_be_planned_is_said(arguments: dict[str, Any], message: str,
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
-        ("RRTC", "RRTConnect"), ("rrt-connect", "RRTConnect"), ("RRT*", "RRTstar"), ("prm*", "PRMstar"),
-        ("PRM_star", "PRMstar"), ("EST", "BatchEST"), ("connect", "RRTConnect"), ("BKP", "BKPIECE"), ("fmtt", "FMT"),
+        ("RRTC", "RRTConnect"),
+        ("rrt-connect", "RRTConnect"),
+        ("RRT*", "RRTstar"),
+        ("prm*", "PRMstar"),
+        ("PRM_star", "PRMstar"),
+        ("EST", "BatchEST"),
+        ("connect", "RRTConnect"),
+        ("BKP", "BKPIECE"),
+        ("fmtt", "FMT"),
     ],
-)  # fmt: skip
+)
 def test_short_forms_of_planners_are_known(name: str, meant: str):
     with pytest.raises(ValueError, match=re.escape(f"there is no planner {name!r}; did you mean {meant!r}?")):
         checked_planner(name)
@@ -563,10 +570,8 @@ def test_the_collector_may_run_at_any_time(planner: str, room: Path):
         f"    assert plan(scene, query.q[0], query.q[-1], planner={planner!r}, time=60).solved\n"
         "    gc.collect()\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, "PYTHONMALLOC": "debug"}, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
+    checked = {**os.environ, "PYTHONMALLOC": "debug"}
+    done = subprocess.run([sys.executable, "-c", code], env=checked, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 

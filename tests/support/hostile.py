@@ -130,7 +130,7 @@ def columns(rng: random.Random, n: int) -> Made:
 
 def bodies_of_one_robot(rng: random.Random, n: int) -> Made:
     count = 2500  # more than make as many pairs as a scene may have
-    joints = "".join(f"{rng.randrange(i + 1)} {i + 1} Revolute 99:1\n{'0 ' * 16}\n" for i in range(count - 1))
+    joints = "".join(f"{rng.randrange(i + 1)} {i + 1} Revolute -1:1\n{'0 ' * 16}\n" for i in range(count - 1))
     bodies = "cube.g Volumetric Rotational\n" + "cube.g Joint\n" * (count - 1)
     return "hostile.env", f"{BOX}1\nActive\n{count}\n{bodies}Connections\n{count - 1}\n{joints}"
 
