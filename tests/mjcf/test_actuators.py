@@ -14,6 +14,7 @@ from scenes import MODELS, free_cube, write_scene
 import env2mjcf
 from env2mjcf import Scene
 from env2mjcf.mjcf.actuators import mass_matrix
+from env2mjcf.options import Actuators
 
 JOINTED = ("gantry/gantry.env", "seed/seed.env", "spherical-arm/spherical-arm.env", "xml-arm/xml-arm.xml",
            "closed-chain/closed-chain.env")  # fmt: skip
@@ -142,7 +143,7 @@ def test_motors_are_forces_and_add_no_damping() -> None:
 
 
 @pytest.mark.parametrize("kind", ["position", "velocity", "motor"])
-def test_keys_hold_still(kind: str) -> None:
+def test_keys_hold_still(kind: Actuators) -> None:
     scene = env2mjcf.load(
         MODELS / "two-robots/two-robots.env", query=MODELS / "two-robots/two-robots.query", actuators=kind
     )
