@@ -225,6 +225,8 @@ CATALOGUE: dict[str, str] = {
     "MJC414": "A texture is not drawn.",
     "MJC415": "The boundary was to be drawn or built, and the scene has none.",
     "MJC416": "Boxes were to be written as box geoms, and no body collides as a box.",
+    "MJC417": "Of the joints of closed loops as many are driven as can move independently.",
+    "MJC418": "Gravity does not pull bodies to the ground.",
     "MJC420": "The output folder may not be written.",
     "MJC421": "A file stands where the output folder should be.",
     "MJC422": "The output cannot be written.",

@@ -16,7 +16,7 @@ from .limits import LARGEST, Limits
 Semantics = Literal["planner", "page"]
 Collision = Literal["auto", "hull", "surface", "solid", "coacd"]
 BoundaryStyle = Literal["visual", "solid"]
-Actuators = Literal["position"]
+Actuators = Literal["position", "velocity", "motor"]
 Engine = Literal["auto", "exact", "mujoco"]
 DialectName = Literal["A", "B", "C", "D", "E"]
 PathArgument = str | PathLike[str]
@@ -47,7 +47,8 @@ class Options:
         exclude_pairs: Pairs of body names that are not tested.
         exclude_rest_contacts: Do not test pairs that touch at home.
         boundary: Draw the boundary as a wire box, or build it as walls (which act in simulation only).
-        actuators: Add position actuators to every joint.
+        actuators: Drive every hinge and slide: by "position", "velocity" or as a "motor", with bounded forces.
+        sensors: Add sensors of joint positions and velocities, and a site `tool` at the last link of each robot.
         density: Density of bodies without a mass of their own, kg per cubic metre.
         gravity: Acceleration of gravity, metres per second squared; unless given, the file's where that is not zero,
             times `scale`, else (0, 0, -9.81).
@@ -76,6 +77,7 @@ class Options:
     exclude_rest_contacts: bool = False
     boundary: BoundaryStyle | None = None
     actuators: Actuators | None = None
+    sensors: bool = False
     density: float = 1000.0
     gravity: tuple[float, float, float] | None = None
     ground: bool = False
@@ -144,6 +146,7 @@ class OptionKeywords(TypedDict, total=False):
     exclude_rest_contacts: bool
     boundary: BoundaryStyle | None
     actuators: Actuators | None
+    sensors: bool
     density: float
     gravity: Iterable[float] | None
     ground: bool

@@ -175,6 +175,17 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     return np.where(q[..., :1] < 0, -q, q)
 
 
+def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the rotation (..., 3, 3) of unit quaternions (..., 4), w x y z."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def pose_gaps(found: Array, expected: Array, radii: ArrayLike) -> Array:
     """Return how far bodies are from where they should be, (...).
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
@@ -15,12 +16,13 @@ from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
 from ..system.imports import installed_version
+from ..transforms import Array
+from .actuators import Drive, add_actuators, add_sensors, drives
 from .geoms import add_contacts, excluded_obstacles
-from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
-from .loops import add_loops
+from .loops import CLOSED, add_loops
 from .markup import Element, add, comment_text, number, numbers, plain, to_text
-from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file
+from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file, time_step
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +47,20 @@ def compile_mjcf(
 ) -> Document:
     """Compile a scene; equal input gives equal bytes."""
     environment = assembly.environment
-    compilation = Compilation(assembly, space, options, excluded_obstacles(pairs))
+    keys = _keys(space, environment.tasks)
+    step = time_step(assembly, options.acceleration(gravity_of_file(environment)))
+    driven: dict[str, Drive] = {}
+    if options.actuators is not None:
+        driven = drives(assembly.robots, space, list(keys.values()), CLOSED * assembly.extent, step, log)
+    damped = {} if options.actuators == "motor" else {name: d.damping for name, d in driven.items()}
+    compilation = Compilation(assembly, space, options, excluded_obstacles(pairs), damped)
     compilation.assets.plan([p.mesh for p in assembly.parts()])
     root = etree.Element("mujoco", model=plain(environment.name))
-    add_settings(root, assembly, pairs, options)
+    add_settings(root, assembly, pairs, options, step, damped=bool(damped))
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")
-    add_scenery(world, assembly, options)
+    add_scenery(world, assembly, options, _lowest(assembly, space, keys.values()) if options.ground else 0.0)
     add_obstacles(world, compilation)
     for robot in range(len(assembly.robots)):
         add_robot(world, robot, compilation)
@@ -61,10 +69,12 @@ def compile_mjcf(
     compilation.assets.write(asset)
     add_contacts(root, pairs, compilation.owners)
     add_loops(root, compilation, log)
-    if options.actuators == "position":
-        add_actuators(root, assembly.robots, space, log)
+    if options.actuators is not None:
+        add_actuators(root, driven, options.actuators)
+    if options.sensors:
+        add_sensors(root, space)
     _report_unused(assembly, options, log)
-    _add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
+    _add_keyframes(root, space, keys, driven if options.actuators == "position" else {})
     text = to_text(root)
     return Document(
         file_stem(environment.name),
@@ -95,18 +105,34 @@ def _header(assembly: Assembly, options: Options) -> str:
     return f"<!--{comment_text(lines)}-->"
 
 
-def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
-    """Append `home`, and `start` and `goal` where there is a task."""
+def _keys(space: ConfigurationSpace, tasks: tuple[Task, ...]) -> dict[str, Array]:
+    """Return the configurations, (dim,), of `home`, and of `start` and `goal` where there is a task."""
     keys = {"home": space.home}
     for q in islice(space.of_tasks(tasks), 1):
         keys |= {"start": q[0], "goal": q[-1]}
+    return keys
+
+
+def _add_keyframes(root: Element, space: ConfigurationSpace, keys: Mapping[str, Array], held: Collection[str]) -> None:
+    """Append the keys; actuators of position hold the joints `held` where they are."""
     if not space.nq:
         return
     keyframe = add(root, "keyframe")
+    joints = [s for slots in space.slots for s in slots if not s.free]
     for name, q in keys.items():
         qpos = space.qpos(q)
-        ctrl = [qpos[s.address] for slots in space.slots for s in slots if not s.free]
-        add(keyframe, "key", name=name, qpos=numbers(qpos), ctrl=numbers(ctrl) if actuated and ctrl else None)
+        ctrl = [qpos[s.address] for joint in held for s in joints if space.names[s.columns[0]] == joint]
+        add(keyframe, "key", name=name, qpos=numbers(qpos), ctrl=numbers(ctrl) if ctrl else None)
+
+
+def _lowest(assembly: Assembly, space: ConfigurationSpace, keys: Iterable[Array]) -> float:
+    """Return the lowest height of any vertex at any key."""
+    heights = [float(assembly.lower[2])]
+    for q in keys:
+        for robot, columns in zip(assembly.robots, space.robot_slices, strict=True):
+            for part, pose in zip(robot.links, robot.kinematics.forward(q[columns]), strict=True):
+                heights.append(float((part.used_vertices @ pose[2, :3]).min() + pose[2, 3]))
+    return min(heights)
 
 
 def _report_unused(assembly: Assembly, options: Options, log: DiagnosticLog) -> None:
@@ -114,6 +140,12 @@ def _report_unused(assembly: Assembly, options: Options, log: DiagnosticLog) -> 
     environment = assembly.environment
     if options.boundary is not None and environment.boundary is None:
         log.info("MJC415", environment.name, f"boundary={options.boundary!r} has no effect: the scene has no boundary")
+    x, y, z = options.acceleration(gravity_of_file(environment))
+    if options.ground and (z > 0 or max(abs(x), abs(y)) > abs(z)):
+        message = f"gravity ({x:g}, {y:g}, {z:g}) does not pull to the ground, which lies below in z"
+        log.warn(
+            "MJC418", environment.name, message, hint="turn gravity, or build walls: boundary='solid' (--boundary)"
+        )
     if options.primitives and not any(p.shape is not None and p.shape.box is not None for p in assembly.parts()):
         why, hint = "no body that collides is an exact box", ""
         if options.collision == "surface":

@@ -1,22 +1,17 @@
-"""Joints: DH connections become hinges and slides, free bases a freejoint, the other bases slides and a hinge.
-
-And actuators, stiff enough to hold a robot up against gravity.
-"""
+"""Joints: DH connections become hinges and slides, free bases a freejoint, the other bases slides and a hinge."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..diagnostics import DiagnosticLog
 from ..geometry.assembly import RobotParts
 from ..kinematics.qpos import joint_kinds
-from ..kinematics.space import ConfigurationSpace
 from ..kinematics.tree import Dof, DofKind
 from ..model.environment import BaseKind
-from ..transforms import inverse
+from ..transforms import inverse, pose_matrix
 from .markup import Element, add, number, numbers, tidy
 
 STANDARD_GRAVITY = 9.80665
@@ -26,11 +21,11 @@ _BASE_AXES = {
     DofKind.Z: ("slide", "0 0 1"),
     DofKind.RZ: ("hinge", "0 0 1"),
 }
-# A gain of m g r holds a link at one radian of error; this many times stiffer, at a hundredth.
-_STIFFNESS = 100.0
 
 
-def add_base_joints(element: Element, robot: RobotParts, body: int, names: Sequence[str]) -> None:
+def add_base_joints(
+    element: Element, robot: RobotParts, body: int, names: Sequence[str], dampings: Mapping[str, float]
+) -> None:
     """Append the joints of a base, named after its degrees of freedom; a free joint is named after its body."""
     dofs = robot.kinematics.dofs
     if robot.kinematics.tree.bases[body] is BaseKind.VOLUMETRIC_ROTATIONAL:
@@ -39,10 +34,12 @@ def add_base_joints(element: Element, robot: RobotParts, body: int, names: Seque
     for i, dof in enumerate(dofs):
         if dof.connection is None and dof.body == body:
             kind, axis = _BASE_AXES[dof.kind]
-            add(element, "joint", name=names[i], type=kind, axis=axis)
+            add(element, "joint", name=names[i], type=kind, axis=axis, damping=_damping(dampings, names[i]))
 
 
-def add_connection_joints(element: Element, robot: RobotParts, body: int, names: Sequence[str]) -> None:
+def add_connection_joints(
+    element: Element, robot: RobotParts, body: int, names: Sequence[str], dampings: Mapping[str, float]
+) -> None:
     """Append the joints of the connection that places a body, in the order of its chain.
 
     The body stands at home, so each joint's `ref` is its home value and the joint's value replaces the DH one.
@@ -65,7 +62,12 @@ def add_connection_joints(element: Element, robot: RobotParts, body: int, names:
             axis=numbers(tidy(axis)),
             range=_range(dof),
             ref=number(robot.home[column]) if robot.home[column] else None,
+            damping=_damping(dampings, names[column]),
         )
+
+
+def _damping(dampings: Mapping[str, float], name: str) -> str | None:
+    return number(dampings[name]) if name in dampings else None
 
 
 def _range(dof: Dof) -> str | None:
@@ -78,44 +80,10 @@ def _range(dof: Dof) -> str | None:
     return f"{number(dof.lower)} {number(dof.upper)}"
 
 
-def add_actuators(root: Element, robots: Sequence[RobotParts], space: ConfigurationSpace, log: DiagnosticLog) -> None:
-    """Append a critically damped `<position>` for every hinge and slide; a free base has none."""
-    actuator = add(root, "actuator")
-    for robot, slots, columns in zip(robots, space.slots, space.robot_slices, strict=True):
-        free = [robot.links[s.body].name for s in slots if s.free]
-        if free:
-            log.info("MJC411", free[0], f"the free base of {free[0]} gets no actuator: it is not driven")
-        for slot in slots:
-            if slot.free:
-                continue
-            column = slot.columns[0]
-            kind = robot.kinematics.dofs[column - columns.start].kind
-            low, high = (float(limit[column] - space.shift[column]) for limit in (space.lower, space.upper))
-            bounded = np.isfinite(low) and np.isfinite(high) and low < high and not space.periodic[column]
-            add(
-                actuator,
-                "position",
-                name=space.names[column],
-                joint=space.names[column],
-                kp=number(_gain(robot, slot.body, kind)),
-                dampratio="1",
-                ctrlrange=f"{number(low)} {number(high)}" if bounded else None,
-            )
-    if not len(actuator):
-        root.remove(actuator)
-
-
-def _gain(robot: RobotParts, body: int, kind: DofKind) -> float:
-    """Return a gain for the mass and reach of all that hangs on a body, rounded to three digits."""
-    connections, parent = robot.kinematics.multibody.connections, robot.kinematics.tree.parent
-    inside = {body}
-    for other in robot.kinematics.tree.order:
-        k = parent[other]
-        if k is not None and connections[k].previous in inside:
-            inside.add(other)
-    hanging = [robot.links[i] for i in sorted(inside)]
-    mass = sum(p.inertial.mass for p in hanging if p.inertial is not None)
-    origin = robot.links[body].pose[:3, 3]
-    reach = max(float(np.linalg.norm(p.pose[:3, 3] - origin)) + p.radius for p in hanging)
-    gain = _STIFFNESS * mass * STANDARD_GRAVITY * (1 / reach if kind.is_length else reach)
-    return float(f"{gain:.3g}")
+def add_tool(element: Element, robot: RobotParts, name: str) -> None:
+    """Append a site at the DH frame of a robot's last link, as which inverse kinematics takes its tool."""
+    k = robot.kinematics.tree.parent[len(robot.links) - 1]
+    to_body = None if k is None else robot.kinematics.multibody.connections[k].to_body
+    frame = np.eye(4) if to_body is None else inverse(pose_matrix(to_body))
+    place = {"pos": numbers(tidy(frame[:3, 3])), "xyaxes": numbers(tidy(frame[:3, :2].T.ravel()))}
+    add(element, "site", name=name, group="5", **place)

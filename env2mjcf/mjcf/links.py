@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..options import Options
 from ..transforms import Array, inverse, quaternion_from_matrix, transform
 from .assets import AssetBook
 from .geoms import add_collision, add_visual, robot_color
-from .joints import add_base_joints, add_connection_joints
+from .joints import add_base_joints, add_connection_joints, add_tool
 from .markup import Element, add, numbers, tidy
 
 # MuJoCo's XML parser refuses the 500th element within others: <mujoco> and <worldbody> are around the bodies, and
@@ -31,6 +32,7 @@ class Compilation:
 
     Attributes:
         assembly, space, options: The input.
+        dampings: Of joints that are driven, by name.
         assets: The assets so far.
         owners: Name of the body that each collision geom belongs to.
         own_bodies: Obstacles that need a body of their own, because an exclude names them.
@@ -41,6 +43,7 @@ class Compilation:
     space: ConfigurationSpace
     options: Options
     own_bodies: frozenset[str]
+    dampings: Mapping[str, float]
     assets: AssetBook = field(default_factory=AssetBook)
     owners: dict[str, str] = field(default_factory=dict[str, str])
     elements: dict[str, Element] = field(default_factory=dict[str, Element])
@@ -105,11 +108,14 @@ def _add_link(
     compilation.elements[part.name] = element
     names = compilation.space.names[compilation.space.robot_slices[number]]
     if previous is None:
-        add_base_joints(element, robot, body, names)
+        add_base_joints(element, robot, body, names, compilation.dampings)
     else:
-        add_connection_joints(element, robot, body, names)
+        add_connection_joints(element, robot, body, names, compilation.dampings)
     if part.inertial is not None:
         _add_inertial(element, part.inertial)
+    if compilation.options.sensors and body == len(robot.links) - 1:
+        several = len(compilation.assembly.robots) > 1
+        add_tool(element, robot, f"robot{number}/tool" if several else "tool")
     _add_geoms(element, part, compilation, obstacle=False, color=robot_color(number))
     return element
 

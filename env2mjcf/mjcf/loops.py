@@ -12,14 +12,14 @@ from ..transforms import Array, inverse, quaternion_from_matrix
 from .links import Compilation
 from .markup import Element, add, numbers, tidy
 
-# A loop counts as closed at home below this fraction of the scene's extent.
-_CLOSED = 1e-6
+CLOSED = 1e-6
+"""A loop counts as closed at home below this fraction of the scene's extent."""
 
 
 def add_loops(root: Element, compilation: Compilation, log: DiagnosticLog) -> None:
     """Append `<equality>`: sites on the connection's DH axis, joined as the joint allows."""
     equality = add(root, "equality")
-    tolerance = _CLOSED * compilation.assembly.extent
+    tolerance = CLOSED * compilation.assembly.extent
     for robot in compilation.assembly.robots:
         gaps = robot.kinematics.loop_gaps(robot.home, [p.radius for p in robot.links])
         for k, gap in zip(robot.kinematics.tree.loops, gaps, strict=True):
@@ -66,6 +66,28 @@ def _add_loop(
     for suffix, offset in offsets:
         a, b = sites(suffix, offset, False)
         add(equality, "connect", name=f"{name}:{suffix}", site1=a, site2=b, active=active)
+
+
+def loop_points(robot: RobotParts, tolerance: float) -> list[tuple[int, int, Array]]:
+    """Return the pairs of bodies that loops closed at home join, and points that they share, (3,) in the world.
+
+    Args:
+        robot: The robot.
+        tolerance: Length below which a loop counts as closed.
+    """
+    found: list[tuple[int, int, Array]] = []
+    for k in robot.kinematics.tree.loops:
+        connection = robot.kinematics.multibody.connections[k]
+        if connection.joint is JointType.PRISMATIC or _axis_gap(robot, k) > tolerance:
+            continue
+        frame = robot.links[connection.previous].pose @ _frames(robot, k)[0]
+        length = max(robot.links[connection.previous].radius, robot.links[connection.next].radius)
+        places = [frame[:3, 3]]
+        if connection.joint is not JointType.SPHERICAL:
+            columns = (0, 1, 2) if connection.joint is JointType.NON_ACTUATED else (2,)
+            places += [frame[:3, 3] + length * frame[:3, c] for c in columns]
+        found += [(connection.previous, connection.next, p) for p in places]
+    return found
 
 
 def _frames(robot: RobotParts, k: int) -> tuple[Array, Array]:

@@ -1,0 +1,217 @@
+"""Actuators hold, follow and are bounded; undamped joints keep their energy; the ground lies below every key."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from chains import write_chain
+from scenes import MODELS, free_cube, write_scene
+
+import env2mjcf
+from env2mjcf import Scene
+from env2mjcf.mjcf.actuators import mass_matrix
+from env2mjcf.options import Actuators
+
+JOINTED = ("gantry/gantry.env", "seed/seed.env", "spherical-arm/spherical-arm.env", "xml-arm/xml-arm.xml",
+           "closed-chain/closed-chain.env")  # fmt: skip
+
+
+def without_contacts(scene: Scene) -> mujoco.MjData:
+    scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_resetDataKeyframe(scene.model, data, 0)
+    return data
+
+
+def driven(model: mujoco.MjModel) -> np.ndarray:
+    """Return where in qpos the driven joints stand."""
+    return model.jnt_qposadr[model.actuator_trnid[:, 0]]
+
+
+def follow(scene: Scene, by: float, seconds: float) -> tuple[float, float, float]:
+    """Move the targets of all hinges; return the last second's swing, the error at the end, and the overshoot."""
+    model, data = scene.model, without_contacts(scene)
+    at = driven(model)
+    data.ctrl += by * (model.jnt_type[model.actuator_trnid[:, 0]] == mujoco.mjtJoint.mjJNT_HINGE)
+    target, last, over = data.ctrl.copy(), [], 0.0
+    while data.time < seconds:
+        mujoco.mj_step(model, data)
+        over = max(over, float((data.qpos[at] - target).max()))
+        if data.time > seconds - 1:
+            last.append(data.qpos[at].copy())
+    assert not data.warning.number.any()
+    return float(np.ptp(last, axis=0).max()), float(np.abs(data.qpos[at] - target).max()), over
+
+
+@pytest.mark.parametrize("by", [0.0, 0.3])
+@pytest.mark.parametrize("size", [0.05, 0.5, 3.0])
+@pytest.mark.parametrize("hinges", [2, 8, 16, 32])
+@pytest.mark.slow_but("2-0.5-0.3", "16-0.05-0.3")
+def test_chains_hold_and_follow(hinges: int, size: float, by: float, tmp_path: Path) -> None:
+    scene = env2mjcf.load(write_chain(tmp_path, hinges, size, size / 5), actuators="position")
+    # A chain of a hundred metres is as slow as a pendulum of that length.
+    seconds = 3 + 1.5 * math.sqrt(hinges * size)
+    swing, error, over = follow(scene, by, seconds)
+    assert swing < 0.01
+    assert error < 0.05
+    assert over < 0.05
+
+
+@pytest.mark.parametrize("path", JOINTED)
+def test_robots_of_ours_hold_and_follow(path: str) -> None:
+    scene = env2mjcf.load(MODELS / path, actuators="position")
+    for by in (0.0, 0.3):
+        swing, error, over = follow(scene, by, 3.0)
+        assert swing < 0.01
+        assert error < 0.05
+        assert over < 0.05
+
+
+@pytest.mark.parametrize("path", JOINTED)
+def test_the_mass_matrix_is_mujocos(path: str) -> None:
+    scene = env2mjcf.load(MODELS / path)
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for q in (scene.space.home, *scene.space.sample(3, seed=1)):
+        data.qpos[:] = scene.space.qpos(q)
+        mujoco.mj_forward(model, data)
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        (robot,) = scene.compiled.assembly.robots
+        ours = mass_matrix(robot, q)
+        joints = [(c, int(model.joint(n).dofadr[0])) for c, n in enumerate(scene.space.names) if n in names(model)]
+        columns, addresses = (list(x) for x in zip(*joints, strict=True))
+        np.testing.assert_allclose(
+            ours[np.ix_(columns, columns)],
+            full[np.ix_(addresses, addresses)],
+            rtol=1e-9,
+            atol=1e-9 * np.abs(full).max(),
+        )
+
+
+def names(model: mujoco.MjModel) -> list[str]:
+    return [model.joint(i).name for i in range(model.njnt)]
+
+
+def test_of_a_closed_loop_as_many_joints_are_driven_as_can_move() -> None:
+    scene = env2mjcf.load(MODELS / "closed-chain/closed-chain.env", actuators="position")
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_resetDataKeyframe(scene.model, data, 0)
+    mujoco.mj_forward(scene.model, data)
+    rows = data.efc_J.reshape(-1, scene.model.nv) if not mujoco.mj_isSparse(scene.model) else None
+    assert rows is not None
+    assert scene.model.nu == scene.model.nv - np.linalg.matrix_rank(rows, tol=1e-6) == 1
+    (told,) = [d for d in scene.diagnostics if d.code == "MJC417"]
+    assert scene.model.actuator(0).name in told.message
+
+
+def test_forces_are_bounded_by_weight_and_reach() -> None:
+    scene = env2mjcf.load(MODELS / "gantry/gantry.env", actuators="position")
+    model, data = scene.model, without_contacts(scene)
+    weight = 9.80665 * model.body_mass.sum()
+    data.ctrl[0] += 100.0
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert np.abs(data.actuator_force).max() <= 5.01 * weight * max(1.0, scene.extent)
+    assert np.abs(data.qvel).max() < 5.0
+
+
+def test_velocity_actuators_reach_the_speed_asked_for() -> None:
+    scene = env2mjcf.load(MODELS / "spherical-arm/spherical-arm.env", actuators="velocity", gravity=(0, 0, 0))
+    model, data = scene.model, without_contacts(scene)
+    data.ctrl[0] = 0.2
+    while data.time < 0.5:
+        mujoco.mj_step(model, data)
+    assert data.qvel[model.joint(model.actuator(0).name).dofadr[0]] == pytest.approx(0.2, abs=0.01)
+    assert np.abs(model.actuator_ctrlrange[:, 1] * model.actuator_gainprm[:, 0]) == pytest.approx(
+        model.actuator_forcerange[:, 1]
+    )
+
+
+def test_motors_are_forces_and_add_no_damping() -> None:
+    scene = env2mjcf.load(MODELS / "spherical-arm/spherical-arm.env", actuators="motor")
+    model, data = scene.model, without_contacts(scene)
+    assert not model.dof_damping.any()
+    data.ctrl[:] = 0.5 * model.actuator_ctrlrange[:, 1]
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.actuator_force, data.ctrl)
+    assert (model.actuator_forcerange[:, 1] > 0).all()
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity", "motor"])
+def test_keys_hold_still(kind: Actuators) -> None:
+    scene = env2mjcf.load(
+        MODELS / "two-robots/two-robots.env", query=MODELS / "two-robots/two-robots.query", actuators=kind
+    )
+    model, data = scene.model, mujoco.MjData(scene.model)
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        wanted = data.qpos[driven(model)] if kind == "position" else np.zeros(model.nu)
+        np.testing.assert_array_equal(data.ctrl, wanted)
+
+
+def test_sensors_and_tools_are_written_on_request() -> None:
+    path = MODELS / "spherical-arm/spherical-arm.env"
+    assert env2mjcf.load(path).model.nsensor == 0
+    scene = env2mjcf.load(path, sensors=True)
+    scene.set(scene.space.sample(1, seed=0)[0])
+    model, data = scene.model, scene.data
+    joints = [n for n in scene.space.names if n in names(model)]
+    for name in joints:
+        assert data.sensor(f"{name}:position").data[0] == data.joint(name).qpos[0]
+    assert model.nsensor == 2 * len(joints)
+    # The frame of the DH row: the last link's, taken back by the last transform of its connection.
+    robot = scene.environment.robots[0]
+    to_body = env2mjcf.transforms.pose_matrix(robot.connections[-1].to_body)
+    frame = scene.link_poses(scene.q())[-1] @ np.linalg.inv(to_body)
+    np.testing.assert_allclose(data.site("tool").xpos, frame[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(data.site("tool").xmat.reshape(3, 3), frame[:3, :3], atol=1e-12)
+    several = env2mjcf.load(MODELS / "two-robots/two-robots.env", sensors=True).model
+    assert [several.site(i).name for i in range(several.nsite)] == ["robot0/tool", "robot1/tool"]
+
+
+@pytest.mark.parametrize(("hinges", "seconds"), [(6, 10), (12, 60), (24, 60)])
+@pytest.mark.slow_but("6-10")
+def test_undamped_chains_keep_their_energy(hinges: int, seconds: float, tmp_path: Path) -> None:
+    scene = env2mjcf.load(write_chain(tmp_path, hinges))
+    model = scene.model
+    model.jnt_limited[:] = 0
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    data = without_contacts(scene)
+    mujoco.mj_forward(model, data)
+    highest = first = float(data.energy.sum())
+    while data.time < seconds:
+        mujoco.mj_step(model, data)
+        highest = max(highest, float(data.energy.sum()))
+    assert not data.warning.number.any()
+    assert highest - first < 0.01 * 9.81 * model.body_mass.sum() * scene.extent
+
+
+def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:
+    # A seventieth of the time in which it falls by its thickness is 1.58 ms.
+    thickness = 9.81 * (70 * 1.58e-3) ** 2 / 2
+    scene = env2mjcf.load(write_chain(tmp_path, 1, 2.0, thickness))
+    assert scene.model.opt.timestep == 1e-3
+
+
+def test_the_ground_lies_below_start_and_goal(tmp_path: Path) -> None:
+    (tmp_path / "a.query").write_text("0 0 0 0 0 0\n0 0 -7 0.25 0 0\n")
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube("5 0 0 0 0 0")), query=tmp_path / "a.query", ground=True)
+    lowest = min(
+        float((part.used_vertices @ pose[:3, :3].T + pose[:3, 3])[:, 2].min())
+        for q in scene.queries[0].q
+        for part, pose in zip(scene.compiled.assembly.links, scene.link_poses(q), strict=True)
+    )
+    height = float(scene.model.geom("ground").pos[2])
+    assert lowest - 2e-3 * scene.extent < height < lowest
+
+
+def test_a_ground_beside_gravity_is_reported(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, free_cube("5 0 0 0 0 0"))
+    for gravity, told in (((0, 0, -9.81), 0), ((9.81, 0, 0), 1), ((0, 0, 3.0), 1), ((0, 0, 0), 0)):
+        scene = env2mjcf.load(path, ground=True, gravity=gravity)
+        assert sum(d.code == "MJC418" for d in scene.diagnostics) == told
