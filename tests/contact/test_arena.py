@@ -197,9 +197,9 @@ class TestMemory:
         assert not list(folder.rglob("MUJOCO_LOG.TXT"))
 
     def test_no_more_is_asked_for_than_is_sane(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(scenery, "MOST_MEMORY", 32 << 20)
-        scene = env2mjcf.load(write_scene(folder, star(120)), engine="mujoco")
-        assert re.findall(r'<size memory="(.*)"/>', scene.xml) == ["32M"]
+        monkeypatch.setattr(scenery, "MOST_MEMORY", 20 << 20)
+        scene = env2mjcf.load(write_scene(folder, star(80)), engine="mujoco")
+        assert re.findall(r'<size memory="(.*)"/>', scene.xml) == ["20M"]
         said = [d for d in scene.diagnostics if d.code == "MJC405"]
         assert [d.severity for d in said] == ["warning"]
         assert "at home" in said[0].message

@@ -69,6 +69,7 @@ def test_views_of_the_system_and_devices_are_not_opened(
                 open_regular(name, or_pipe=or_pipe)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [*VIEWS[:1], "/dev/zero"])
 def test_nobody_waits_for_them(path: str, tmp_path: Path) -> None:
     scene = write_scene(tmp_path, free_cube("4 0 0 0 0 0"))
