@@ -231,7 +231,10 @@ def mesh_diagnostics(
     # A sheet has no outside, so that its winding says nothing.
     if not analysis.consistent and not analysis.flat:
         done = "faces were turned round to agree" if analysis.oriented else "no side is known to be outside"
-        warn("GEO234", f"neighbouring faces are wound opposite ways; {done}")
+        # Without a winding, the engines tell what is inside by different rules.
+        unsure = (analysis.closed_components & ~analysis.solids).any()
+        hint = "mend its winding: verdicts on what is wholly inside this mesh are not certain" if unsure else ""
+        warn("GEO234", f"neighbouring faces are wound opposite ways; {done}", hint)
     elif analysis.inverted:
         warn("GEO233", f"wound inside out (volume {analysis.signed_volume:.6g}); the faces were turned round")
     if analysis.crowded_edges:

@@ -15,7 +15,7 @@ from .topology import RELATIVE_TOLERANCE, Floats, area_vectors
 from .union import Union, union
 
 SHELL_THICKNESS = 0.01
-"""Thickness of the sheet that stands for a mesh without inside, in units of its diagonal."""
+"""Thickness of the sheet that stands for a mesh without inside, in units of the diagonal of what is open."""
 
 LEAST = 1e-14
 """Least mass and moment: ten times what MuJoCo takes for nothing (mjMINVAL)."""
@@ -48,7 +48,8 @@ def inertial(
 ) -> Inertial:
     """Return the inertia of a mesh of uniform density.
 
-    Solid pieces have the exact moments of their polyhedra; all others those of a sheet of 1 % of the mesh's diagonal.
+    Solid pieces have the exact moments of their polyhedra; all others together those of a sheet of 1 % of their
+    diagonal.
 
     Args:
         mesh: The mesh; its name appears in the note.
@@ -59,7 +60,6 @@ def inertial(
     """
     notes: list[str] = []
     origin = analysis.vertices.mean(axis=0) if len(analysis.vertices) else np.zeros(3)
-    thickness = SHELL_THICKNESS * analysis.diagonal
     filled = filled or union(analysis)
     loose = np.ones(len(analysis.faces), dtype=np.bool_)
     parts: list[tuple[float, Floats, Floats]] = []
@@ -67,7 +67,9 @@ def inertial(
         parts.append(_solid(filled.triangles - origin))
         loose = ~analysis.solids[analysis.component]
     if loose.any() or not parts:
-        parts.append(_sheet(analysis.vertices[analysis.faces[loose]] - origin, thickness))
+        corners = analysis.vertices[analysis.faces[loose]]
+        thickness = SHELL_THICKNESS * float(np.linalg.norm(np.ptp(corners, axis=(0, 1))))
+        parts.append(_sheet(corners - origin, thickness))
         what = mesh.name if loose.all() else f"a part of {mesh.name} in {counted(int(loose.sum()), 'triangle')}"
         notes.append(f"{what} encloses no certain volume, so it was taken for a sheet {thickness:.3g} thick")
     volume, com, second = parts[0] if len(parts) == 1 else _together(*parts)

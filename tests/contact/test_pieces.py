@@ -91,8 +91,8 @@ def test_a_robot_with_an_open_piece_holds_what_is_in_its_closed_one(tmp_path: Pa
         assert not scene.in_collision([-2.0, 0, 0, 0, 0, 0], engine=engine)
         # A point of the closed one that is inside of the obstacle's surface only as a solid: both ways round.
         assert scene.in_collision([2.5, 0.3, -0.2, 0.3, 0.1, 0], engine=engine)
-    # The solid is exact, and the open one a sheet of a hundredth of the diagonal.
-    area, diagonal = 24 - 2, float(np.sqrt(36 + 4 + 4))
+    # The solid is exact, and the open one a sheet of a hundredth of its own diagonal.
+    area, diagonal = 24 - 2, float(np.sqrt(4 + 4 + 4))
     assert scene.report.mass == pytest.approx(1000 * (8 + area * diagonal / 100))
     assert any("a part of two in 11 triangles" in d.message for d in scene.diagnostics if d.code == "GEO250")
 

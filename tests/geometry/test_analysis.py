@@ -152,11 +152,15 @@ def test_a_one_sided_closed_surface_has_no_outside() -> None:
         [4, 5, 2],
         [5, 1, 3],
     ]
-    a = analyse(Mesh.from_arrays("plane", np.random.default_rng(0).random((6, 3)), faces))
+    mesh = Mesh.from_arrays("plane", np.random.default_rng(0).random((6, 3)), faces)
+    a = analyse(mesh)
     assert a.closed
     assert not a.oriented
     assert not a.solid
     assert a.volume == 0
+    log = DiagnosticLog()
+    mesh_diagnostics(mesh, a, log)
+    assert ["not certain" in d.hint for d in log if d.code == "GEO234"] == [True]
 
 
 def test_a_box_without_a_side_is_open() -> None:
