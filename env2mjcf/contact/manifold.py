@@ -14,7 +14,7 @@ from ..geometry.triangle_search import Jobs, Search
 from ..pairs import Pair
 from ..transforms import Array
 from .clearance import BAND, Clearance
-from .separation import nearest_points, off_planes, overlap, pair_triangles, separations, touching_triangles
+from .separation import nearest_points, off_planes, overlap, pair_triangles, separations
 from .surfaces import Surfaces
 from .types import Contact
 
@@ -79,18 +79,15 @@ class Manifolds:
         job = self._clearance.pair_jobs(poses, np.array([index]))
         pose = poses[pair.link][0]
         convex = overlap(surfaces, job, 0)
+        solid = surfaces.surface(int(job.a[0])).solid or surfaces.surface(int(job.b[0])).solid
+        if convex is None or convex.depth <= self._band or not solid:
+            points = nearest_points(surfaces, job, touch)
+            if points.distance[0] > touch and not surfaces.contained(job)[0]:
+                return [_apart(points, pose)]
         if convex is not None:
-            solid = surfaces.surface(int(job.a[0])).solid or surfaces.surface(int(job.b[0])).solid
-            if convex.depth <= self._band or not solid:
-                points = nearest_points(surfaces, job, touch)
-                if points.distance[0] > touch and not surfaces.contained(job)[0]:
-                    return [_apart(points, pose)]
             places, depths = convex.patch(_FLAT * min(self._sizes[pair.link], self._sizes[pair.other]))
             turned = pose[:3, :3] @ -convex.push
             return [Touch(p, turned, -float(d)) for p, d in zip(_world(pose, places), depths, strict=True)]
-        hits = touching_triangles(surfaces, job, touch)
-        if not (len(hits) or surfaces.contained(job)[0]):
-            return [_apart(nearest_points(surfaces, job, touch), pose)]
         whole, push = separations(surfaces, job, touch)
         depth, normal = float(whole[0]), pose[:3, :3] @ -push[0]
         if not (found and self._hulls[pair.link] and self._hulls[pair.other]):

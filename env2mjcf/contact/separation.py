@@ -15,7 +15,7 @@ from .convex_depth import FAN, Overlap
 from .surfaces import Surface, Surfaces, unit, unit_normals
 
 # The first window is this fraction of the smaller mesh, or down to this fraction of that where a short push may do;
-# each next one is this many times as long.
+# each next one, behind it, is this many times as long.
 _FIRST_WINDOW, _NARROWEST, _WIDER = 0.1, 0.01, 4.0
 # How many pairs of touching triangles are looked at, in how many directions they are taken apart, how many of the
 # pushes of each kind that take all of them apart are tried, how many others, and of how many normals; and how often.
@@ -23,6 +23,8 @@ _TOUCHING, _WAYS, _PUSHES, _OTHERS, _LEFT_SOON, _AGAIN = 512, 8, 2, 8, 4, 3
 # Off planes of either, of b alone, of a alone, off planes or square to edges: columns of ways to take triangles apart.
 _KINDS = (slice(0, 4), slice(0, 2), slice(2, 4), slice(0, 6))
 _DIGITS = 9
+# Of each push, pairs of nodes in a level of the trees that are looked at to begin with.
+_FEW = 512
 _BLOCK = 4096
 
 
@@ -113,26 +115,43 @@ def touching_triangles(surfaces: Surfaces, job: Jobs, touch: float) -> Ints:
     return np.concatenate([near[:0], *hits])
 
 
+def _some(hits: Ints) -> Ints:
+    """Return not too many of pairs of triangles, by numbers that look random: one more or less changes one at most."""
+    if len(hits) <= _TOUCHING:
+        return hits
+    a, b = hits.astype(np.uint64).T
+    scattered = (a * np.uint64(0x9E3779B97F4A7C15)) ^ (b * np.uint64(0xC2B2AE3D27D4EB4F))
+    scattered = (scattered ^ (scattered >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    return hits[np.sort(np.argsort(scattered ^ (scattered >> np.uint64(32)), kind="stable")[:_TOUCHING])]
+
+
 def _push(
     surfaces: Surfaces, jobs: Jobs, trials: _Trials, depth: Floats, push: Floats, window: Floats, touch: float
 ) -> None:
-    """Try pushes in windows that grow, until one of a job separates it; what is longer cannot be better."""
+    """Try pushes in windows, one behind the other and each longer, as far as the best one of their job that is known.
+
+    Before that, a few of the triangles on the way tell at least how far each must go.
+    """
+    few = _FEW
     while len(trials.job):
         moved = _moved(jobs, trials.job, trials.direction * trials.offset[:, None])
-        ways = escapes(surfaces.trees, moved, trials.direction, np.minimum(window, depth)[trials.job])
-        free = np.isfinite(ways)
+        left = depth[trials.job] - trials.offset
+        reach = left if few else np.minimum(window[trials.job], left)
+        ways = escapes(surfaces.trees, moved, trials.direction, reach, few)
+        places, ended = trials.offset + ways, (ways <= reach) & (few == 0)
+        free = ended.copy()
         if free.any():
-            beyond = (ways + trials.offset)[free] + 10 * touch
+            beyond = places[free] + 10 * touch
             after = _moved(jobs, trials.job[free], trials.direction[free] * beyond[:, None])
             free[free] = ~surfaces.contained(after)
         for i in np.flatnonzero(free):
-            k, way = trials.job[i], ways[i] + trials.offset[i]
-            if way < depth[k]:
-                depth[k], push[k] = way, trials.direction[i]
-        done = np.zeros(len(jobs.a), dtype=np.bool_)
-        done[trials.job[free]] = True
-        trials = trials.only(~(done | (window >= depth))[trials.job])
-        window *= _WIDER
+            k = trials.job[i]
+            if places[i] < depth[k]:
+                depth[k], push[k] = places[i], trials.direction[i]
+        # Back by what is no distance: rounding must not open a gap where one crossing ends and another begins.
+        further = _Trials(trials.job, trials.direction, np.maximum(places - touch, trials.offset))
+        trials = further.only(~ended & (places < depth[trials.job]))
+        window, few = window * (1 if few else _WIDER), 0
 
 
 def _moved(jobs: Jobs, of: Ints, push: Floats) -> Jobs:
@@ -195,8 +214,7 @@ def _pushes_of(surfaces: Surfaces, job: Jobs, hits: Ints, touch: float) -> tuple
     at, here, found = np.zeros(3), job, list[tuple[Floats, Floats, Floats]]()
     directions, ways = np.zeros((0, 6, 3)), np.zeros((0, 6))
     for _ in range(_AGAIN):
-        pairs = hits[np.linspace(0, len(hits) - 1, min(len(hits), _TOUCHING)).astype(np.int64)]
-        more, needed = _ways_apart(*pair_triangles(surfaces, here, pairs), a, b)
+        more, needed = _ways_apart(*pair_triangles(surfaces, here, _some(hits)), a, b)
         # What merely touches must not be pushed against, either.
         needed = np.maximum(needed, touch) + more @ at
         directions, ways = np.concatenate([directions, more]), np.concatenate([ways, needed])

@@ -14,21 +14,24 @@ _BLOCK = 20_000
 _SLACK = 1e-9
 
 
-def escapes(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> Floats:
-    """Return how far to push mesh a until no triangles cross, (j,): exact; inf if that is beyond the window.
+def escapes(trees: Forest, jobs: Jobs, directions: Floats, window: Floats, few: int = 0) -> Floats:
+    """Return how far to push mesh a until no triangles cross, (j,): exact; if beyond the window, at least how far.
 
     While it is pushed, a triangle crosses another during one interval, because both are convex. The answer is the
-    first place, from the start, that no interval covers.
+    first place, from the start, that no interval covers of those that begin in the window.
 
     Args:
         trees: The meshes.
         jobs: Meshes at relative poses, which may cross.
         directions: (j, 3) unit vectors in the frame of a.
         window: (j,) greatest way.
+        few: Of how many pairs of nodes on a level, about, each answer is made, if not of all: it is then at least how
+            far.
     """
 
     def meet(job: Ints, a: Ints, b: Ints) -> Bools:
-        return _boxes_meet(trees, jobs, directions, window, job, a, b)
+        kept = _boxes_meet(trees, jobs, directions, window, job, a, b)
+        return _thinned(job, kept, few) if few else kept
 
     job, a, b = leaves(trees, jobs, meet, _BLOCK)
     starts, ends = np.empty(len(job)), np.empty(len(job))
@@ -47,7 +50,17 @@ def escapes(trees: Forest, jobs: Jobs, directions: Floats, window: Floats) -> Fl
         covered = np.maximum.accumulate(np.append(0.0, ends[mine]))
         gap = np.append(starts[mine], np.inf) > covered
         out[k] = covered[int(np.argmax(gap))]
-    return np.where(out <= window, out, np.inf)
+    return out
+
+
+def _thinned(job: Ints, kept: Bools, few: int) -> Bools:
+    """Return so many at most of those that are kept of each job, evenly spread; the jobs are sorted."""
+    rows = np.flatnonzero(kept)
+    _, first, of, count = np.unique(job[rows], return_index=True, return_inverse=True, return_counts=True)
+    rank, share = np.arange(len(rows)) - first[of], np.minimum(few / count, 1.0)[of]
+    out = np.zeros_like(kept)
+    out[rows[np.floor((rank + 1) * share) > np.floor(rank * share)]] = True
+    return out
 
 
 def _boxes_meet(trees: Forest, jobs: Jobs, directions: Floats, window: Floats, job: Ints, a: Ints, b: Ints) -> Bools:

@@ -392,7 +392,8 @@ class Scene:
     def touching_pairs(self, q: ArrayLike) -> tuple[tuple[str, str], ...]:
         """Return those of `pairs` that touch at one configuration, (dim,), in their order, as MuJoCo's engine says.
 
-        For non-convex bodies much quicker than `contacts`, which say where, and how deep.
+        For non-convex bodies much quicker than `contacts`, which say where, and how deep. Cannot be interrupted while
+        MuJoCo looks: where millions of cells meet, that is many seconds.
 
         Raises:
             ValueError: q is not one configuration.

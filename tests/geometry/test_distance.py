@@ -139,7 +139,11 @@ def test_a_push_ends_where_the_triangles_come_free() -> None:
         for part in np.linspace(0, 0.9999, 40):
             if ways[k] > 0:
                 assert fcl_distance(small[0] + part * ways[k] * directions[k], moved) <= 1e-6
-    assert np.isinf(escapes(forest(list(small)), jobs, directions, ways / 2)[ways > 0]).all()
+    for few in (0, 1, 5):
+        short = escapes(forest(list(small)), jobs, directions, ways / 2, few)
+        assert (short <= ways + 1e-12).all()
+        if not few:
+            assert (short > ways / 2)[ways > 0].all()
 
 
 def test_the_triangles_of_a_hull_enclose_its_points() -> None:
