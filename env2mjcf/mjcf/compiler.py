@@ -15,6 +15,7 @@ from ..model.names import file_stem
 from ..options import Options
 from ..pairs import PairTable
 from ..system.imports import installed_version
+from ..transforms import Array
 from .geoms import add_contacts, excluded_obstacles
 from .joints import add_actuators
 from .links import Compilation, add_obstacles, add_robot
@@ -52,7 +53,8 @@ def compile_mjcf(
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")
-    add_scenery(world, assembly, options)
+    keys = _keys(space, environment.tasks)
+    add_scenery(world, assembly, keys.values(), options)
     add_obstacles(world, compilation)
     for robot in range(len(assembly.robots)):
         add_robot(world, robot, compilation)
@@ -64,7 +66,7 @@ def compile_mjcf(
     if options.actuators == "position":
         add_actuators(root, assembly.robots, space, log)
     _report_unused(assembly, options, log)
-    _add_keyframes(root, space, environment.tasks, actuated=options.actuators is not None)
+    _add_keyframes(root, space, keys, actuated=options.actuators is not None)
     text = to_text(root)
     return Document(
         file_stem(environment.name),
@@ -95,11 +97,15 @@ def _header(assembly: Assembly, options: Options) -> str:
     return f"<!--{comment_text(lines)}-->"
 
 
-def _add_keyframes(root: Element, space: ConfigurationSpace, tasks: tuple[Task, ...], *, actuated: bool) -> None:
-    """Append `home`, and `start` and `goal` where there is a task."""
+def _keys(space: ConfigurationSpace, tasks: tuple[Task, ...]) -> dict[str, Array]:
+    """Return `home`, and `start` and `goal` where there is a task."""
     keys = {"home": space.home}
     for q in islice(space.of_tasks(tasks), 1):
         keys |= {"start": q[0], "goal": q[-1]}
+    return keys
+
+
+def _add_keyframes(root: Element, space: ConfigurationSpace, keys: dict[str, Array], *, actuated: bool) -> None:
     if not space.nq:
         return
     keyframe = add(root, "keyframe")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,8 +149,8 @@ def add_ground_material(asset: Element) -> None:
     add(asset, "material", name="ground", texture="ground", texrepeat="8 8", reflectance="0.05")
 
 
-def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
-    """Append light, camera, and on request ground and boundary."""
+def add_scenery(world: Element, assembly: Assembly, keys: Iterable[Array], options: Options) -> None:
+    """Append light, camera, and on request ground, below all bodies at each of some configurations, and boundary."""
     center, extent = (assembly.lower + assembly.upper) / 2, assembly.extent
     above = center + np.array([0, 0, extent])
     light = {"dir": "-0.3 0.4 -1", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}
@@ -157,7 +158,7 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
     add(world, "camera", name="overview", **_camera(center, extent))
     if options.ground:
         # Slightly below the lowest point, so that nothing starts in contact with it.
-        pos = numbers((center[0], center[1], _lowest(assembly) - 1e-3 * extent))
+        pos = numbers((center[0], center[1], _lowest(assembly, keys) - 1e-3 * extent))
         size = numbers((extent, extent, extent / 20))
         add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size)
     boundary = assembly.boundary
@@ -167,10 +168,18 @@ def add_scenery(world: Element, assembly: Assembly, options: Options) -> None:
         add_walls(world, boundary, assembly)
 
 
-def _lowest(assembly: Assembly) -> float:
-    """Return the lowest height of any vertex at home, of robots far away, too."""
-    heights = [float((p.used_vertices @ p.pose[2, :3]).min() + p.pose[2, 3]) for p in assembly.links]
-    return min(float(assembly.lower[2]), *heights) if any(assembly.origin) and heights else float(assembly.lower[2])
+def _lowest(assembly: Assembly, keys: Iterable[Array]) -> float:
+    """Return the lowest height of any vertex, wherever the keys have the robots."""
+    heights = [float(assembly.lower[2])]
+    for q in keys:
+        stop = 0
+        for robot in assembly.robots:
+            start, stop = stop, stop + robot.kinematics.dim
+            poses = robot.kinematics.forward(q[start:stop])
+            heights += [
+                float((p.used_vertices @ at[2, :3]).min() + at[2, 3]) for p, at in zip(robot.links, poses, strict=True)
+            ]
+    return min(heights)
 
 
 def _camera(center: Array, extent: float) -> dict[str, str]:
