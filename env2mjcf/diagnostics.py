@@ -99,7 +99,7 @@ CATALOGUE: dict[str, str] = {
     "ENV183": "A boundary, or a limit of a joint, is too large to be computed with.",
     # Tasks of several robots, and rules about pairs, of problem files.
     "ENV184": "A group names an unknown robot, or a group task an unknown group.",
-    "ENV185": "A rule about pairs stands where it does not count, and is not followed.",
+    "ENV185": "A rule about pairs stands where it does not count, or is spelled otherwise, and is not followed.",
     "ENV186": "A group task does not have a task for each robot of its group, or has one for another robot.",
     "ENV187": "The robots of a group task visit different numbers of configurations; who is done waits at its goal.",
     # What a translation does not replace.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import os
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
@@ -131,14 +132,14 @@ class FileError(Env2MjcfError, OSError):
     """A file that the system does not give: an `OSError`, too, of the kind that opening it would raise.
 
     Attributes:
-        errno, filename: As of an `OSError`.
+        errno, strerror, filename: As of an `OSError`.
     """
 
     number: int
 
     def __init__(self, diagnostic: Diagnostic, diagnostics: Iterable[Diagnostic] = ()) -> None:
         super().__init__(diagnostic, diagnostics)
-        self.errno, self.filename = self.number, diagnostic.subject
+        self.errno, self.strerror, self.filename = self.number, os.strerror(self.number), diagnostic.subject
 
     def __str__(self) -> str:
         return str(self.diagnostic)

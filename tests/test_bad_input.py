@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -188,6 +189,7 @@ def test_a_missing_file_is_a_file_not_found_error_too(tmp_path: Path, what: str)
     with pytest.raises(FileNotFoundError) as caught:
         calls[what]()
     error = caught.value
+    assert (error.errno, error.strerror) == (errno.ENOENT, os.strerror(errno.ENOENT))
     assert isinstance(error, env2mjcf.GeometryError if what == "mesh" else env2mjcf.FormatError)
     assert error.code == ("GEO201" if what == "mesh" else "ENV101")
     assert error.errno == errno.ENOENT

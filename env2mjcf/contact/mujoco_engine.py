@@ -87,6 +87,8 @@ class MujocoEngine:
         for name in _LENGTHS:
             getattr(self.model, name)[:] *= factor
         self.model.qpos0[self._lengths] *= factor
+        # Frames less than a millionth of a metre apart were taken for one when the model was compiled.
+        self.model.body_sameframe[:] = self.model.geom_sameframe[:] = 0
 
     def _place(self, row: Array, data: mujoco.MjData) -> None:
         """Put the bodies of `data` at qpos, in metres."""

@@ -150,7 +150,8 @@ def _read_labels(problem: Node) -> _Labels:
             node.fail("ENV151", message, hint="group tasks name groups by their labels", at="label")
         members = (node.get("robotLabels") or "").split()
         for unknown in (m for m in members if m not in labels.robots and m not in labels.virtual):
-            _fail_unknown(node, f"group {label!r} has", "robot", unknown, labels.robots, "ENV184", "robotLabels")
+            hint = "write blanks between labels, and no commas" * ("," in unknown)
+            _fail_unknown(node, f"group {label!r} has", "robot", unknown, labels.robots, "ENV184", "robotLabels", hint)
         labels.groups[label] = tuple(dict.fromkeys(m for m in members if m in labels.robots))
     return labels
 

@@ -178,6 +178,8 @@ def _read_bytes(name: str, log: DiagnosticLog, limits: Limits, named_at: Span | 
             # One more than allowed: the size that the system states does not bound pipes and devices.
             data = read_at_most(file, limits.file_bytes + 1)
     except FileNotFoundError:
+        if os.path.islink(name):
+            fail("ENV101", f"there is no file {name}", f"it is a link to {os.readlink(name)}, which does not exist")
         others = _names_in(Path(name).parent)
         fail("ENV101", f"there is no file {name}", did_you_mean(Path(name).name, others) or "check the name")
     except PermissionError:

@@ -190,9 +190,11 @@ class Node:
         for name in others:
             span = self.source.span(*places[name]) if name in places else self.span
             message = f"attribute {name!r} of <{self.tag}> is not used"
-            if _PAIR_RULES.fullmatch(name.lower()) and self.tag.lower() != "collisiondetection":
-                hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
-                message += ": it counts on <CollisionDetection>"
+            if _PAIR_RULES.fullmatch(name.lower()):
+                hint = did_you_mean(name, known)
+                if self.tag.lower() != "collisiondetection":
+                    hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
+                    message += ": it counts on <CollisionDetection>"
                 self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
             else:
                 hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""

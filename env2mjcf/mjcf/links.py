@@ -25,6 +25,9 @@ from .markup import Element, add, numbers, tidy
 # geoms in the last.
 _MOST_LINKS = 496
 
+# In metres: frames that are nearer to each other are one to MuJoCo.
+_SAME_FRAME = 1e-6
+
 
 @dataclass(slots=True)
 class Compilation:
@@ -135,7 +138,9 @@ def _add_geoms(
 
 
 def _add_inertial(element: Element, inertial: Inertial) -> None:
-    pos, quat = numbers(tidy(inertial.com)), numbers(tidy(inertial.quat))
+    # MuJoCo takes so near a frame for that of the body when it moves, but not when it builds bounding volumes.
+    com = inertial.com if np.linalg.norm(inertial.com) >= _SAME_FRAME else np.zeros(3)
+    pos, quat = numbers(tidy(com)), numbers(tidy(inertial.quat))
     mass, diagonal = numbers(inertial.mass), numbers(inertial.diagonal)
     add(element, "inertial", pos=pos, quat=quat, mass=mass, diaginertia=diagonal)
 

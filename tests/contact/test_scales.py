@@ -11,9 +11,10 @@ import pytest
 
 import env2mjcf
 from tests.support.real_scenes import FEW, real_scene, scene_names
-from tests.support.scenes import box_mesh, write_scene
+from tests.support.scenes import MODELS, box_mesh, write_scene
 
 PLAY = 0.05
+MOVED = np.array([0.05, 0.02, 0.03])
 SCALES = (1e-7, 1e-5, 1e-3, 1e3, 1e6)
 
 
@@ -126,6 +127,44 @@ def test_fixed_bodies_of_tiny_scenes_touch_where_they_do(tmp_path: Path) -> None
             assert contact.distance == pytest.approx(-0.05e-5, rel=1e-3)
             assert contact.position[2] == pytest.approx(0.475e-5, rel=1e-2)
             assert contact.normal == pytest.approx([0, 0, 1], abs=1e-6)
+
+
+def test_frames_that_nearly_coincide_are_two_to_the_engine(tmp_path: Path) -> None:
+    """MuJoCo takes frames less than 1e-6 m apart for one: here that is a tenth of a box."""
+    text = (
+        '<Environment><MultiBody type="passive"><Base filename="box.g" comAdjustment="none" type="fixed" '
+        'transform="0 0 0 0 0 0"/></MultiBody></Environment>'
+    )
+    header, counts, *rows = box_mesh(0.6, 0.8, 1.0).splitlines()
+    moved = [" ".join(repr(float(x) + float(by)) for x, by in zip(r.split(), MOVED, strict=True)) for r in rows[:8]]
+    path = write_scene(tmp_path, text, "scene.xml", box="\n".join([header, counts, *moved, *rows[8:]]))
+    (tmp_path / "c.robot").write_text("1\ncube.g Volumetric Rotational\nConnections\n0\n")
+    scene = env2mjcf.load(path, robots=tmp_path / "c.robot", scale=1e-5, cache=False)
+    q = np.zeros((2000, 6))
+    q[:, :3] = np.random.default_rng(0).uniform(-2, 2, (2000, 3))
+    gap = (np.abs(q[:, :3] - MOVED) - (1.1, 1.3, 1.5)).max(axis=1)
+    q, gap = q[np.abs(gap) > 1e-4], gap[np.abs(gap) > 1e-4]
+    q[:, :3] *= 1e-5
+    assert (scene.in_collision(q, engine="mujoco") == (gap < 0)).all()
+
+
+# What MuJoCo did not find in bounding volumes that stood about another frame than the body.
+SLIPPED = [208, 3225, 4856, 5975, 6753]
+
+
+def test_bounding_volumes_of_tiny_links_stand_where_the_links_do() -> None:
+    folder = MODELS / "gantry"
+    usual, small = (env2mjcf.load(folder / "gantry.env", scale=s) for s in (1.0, 1e-5))
+    model = small.model
+    assert not model.body_ipos[model.body_sameframe == mujoco.mjtSameFrame.mjSAMEFRAME_BODY].any()
+    q = usual.space.sample(8000, 3)[SLIPPED]
+    assert usual.in_collision(q).all()
+    q[:, [not name.endswith((".rx", ".ry", ".rz", ".theta")) for name in usual.space.names]] *= 1e-5
+    data = mujoco.MjData(model)
+    for qpos in small.space.qpos(q):
+        data.qpos[:] = qpos
+        mujoco.mj_forward(model, data)
+        assert data.ncon
 
 
 def test_what_mujoco_cannot_hold_is_refused_with_the_figure(peg: Path) -> None:

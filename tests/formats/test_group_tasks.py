@@ -165,6 +165,26 @@ def test_rules_about_pairs_count_on_collision_checkers_only(problem: Reader, tmp
     assert (scene.planner_rules.ignore_self_collision, scene.planner_rules.adjacent_links) == (None, None)
 
 
+@pytest.mark.parametrize(
+    ("name", "known"), [("IgnoreAdjacentLinks", "ignoreAdjacentLinks"), ("interRobotCollision", "")]
+)
+def test_rules_that_no_collision_checker_knows_are_a_warning(tmp_path: Path, name: str, known: str) -> None:
+    write(tmp_path, E, "scene.env")
+    checker = f'<CollisionDetection method="RAPID" {name}="true"/>'
+    text = f'<MotionPlanning><Problem><Environment filename="scene.env"/></Problem>{checker}</MotionPlanning>'
+    scene = env2mjcf.read(write(tmp_path, text, "problem.xml"))
+    (warning,) = (d for d in scene.diagnostics if d.code == "ENV185")
+    assert warning.message == f"attribute {name!r} of <CollisionDetection> is not used"
+    assert known in warning.hint
+    assert scene.planner_rules.adjacent_links is None
+
+
+def test_commas_between_the_robots_of_a_group_are_told(problem: Reader) -> None:
+    error = fault(problem, '<RobotGroup label="pair" robotLabels="a, b"/>')
+    assert error.code == "ENV184"
+    assert "no commas" in error.hint
+
+
 # Every element that a reader knows, with an attribute and an element in it that none reads.
 KNOWN = """<MotionPlanning{x}><Problem{x}>
 <Environment{x}>

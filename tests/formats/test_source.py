@@ -110,6 +110,13 @@ def test_a_missing_file_names_the_near_one(tmp_path: Path) -> None:
     assert "did you mean 'scene.env'?" in found.hint
 
 
+def test_a_link_to_nothing_names_what_it_leads_to(tmp_path: Path) -> None:
+    (tmp_path / "link.env").symlink_to("gone.env")
+    found = fault(env2mjcf.read, str(tmp_path / "link.env"))
+    assert found.code == "ENV101"
+    assert found.hint == "it is a link to gone.env, which does not exist"
+
+
 def test_a_folder_names_the_scenes_in_it(tmp_path: Path) -> None:
     write(tmp_path, B, "scene.env")
     found = fault(env2mjcf.read, str(tmp_path))

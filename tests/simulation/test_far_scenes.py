@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -11,6 +12,7 @@ import trimesh
 
 import env2mjcf
 from env2mjcf.simulation.scene import Scene
+from env2mjcf.view.web.nodes import WebScene
 from tests.support.extras import needs
 from tests.support.scenes import box_mesh, write_scene
 
@@ -437,6 +439,52 @@ def test_the_ground_lies_below_every_key(tmp_path: Path, ground: bool) -> None:
     assert len(planes) == ground
     for plane in planes:
         assert scene.model.geom_pos[plane, 2] < scene.space.qpos(scene.space.home)[2] - 0.5
+
+
+@pytest.mark.parametrize("at", [np.zeros(3), FAR], ids=["near", "far"])
+def test_the_ground_lies_below_start_and_goal(tmp_path: Path, at: np.ndarray) -> None:
+    """A cube of half side 0.5 is taken under the hall."""
+    path = dialect_d(tmp_path / "scene", at)
+    starts = [numbers(np.r_[np.add(at, (0.3, 0.2, z)), 0, 0, 0, 0]) for z in (-400, -390)]
+    path.with_suffix(".query").write_text("\n".join(starts) + "\n")
+    scene = env2mjcf.load(path, query=path.with_suffix(".query"), ground=True, cache=False)
+    lowest = min(scene.model.key(name).qpos[2] for name in ("home", "start", "goal")) - 0.5
+    assert lowest - 1 < scene.model.geom("ground").pos[2] < lowest
+
+
+class Page:
+    """Keeps what a page is handed, in the precision of browsers."""
+
+    def __init__(self) -> None:
+        self.scene = self
+        self.shown: list[tuple[np.ndarray, SimpleNamespace]] = []
+
+    def add_mesh_simple(self, name: str, vertices: np.ndarray, faces: np.ndarray, **_: object) -> SimpleNamespace:
+        self.shown.append((vertices.astype(np.float32), SimpleNamespace()))
+        return self.shown[-1][1]
+
+    def points(self) -> np.ndarray:
+        return np.concatenate(
+            [v.astype(float) @ mujoco_rotation(node.wxyz).T + node.position for v, node in self.shown]
+        )
+
+
+def mujoco_rotation(quaternion: np.ndarray) -> np.ndarray:
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, np.asarray(quaternion))
+    return flat.reshape(3, 3)
+
+
+def test_pages_show_bodies_where_they_are(pair: tuple[str, Scene, Scene]) -> None:
+    _, near, far = pair
+    shown: list[np.ndarray] = []
+    for scene, at in ((near, np.zeros(3)), (far, FAR)):
+        page = Page()
+        web = WebScene(page, scene)  # type: ignore[arg-type]
+        web.place(scene.link_poses(rows(scene, 1, at)[0]))
+        shown.append(page.points() + scene.origin - at)
+        assert max(np.spacing(np.abs(v).max()) for v, _ in page.shown) < 1e-5
+    assert shown[0] == pytest.approx(shown[1], abs=1e-5)
 
 
 @needs("view")

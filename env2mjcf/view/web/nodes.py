@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...contact.types import Contact
-from ...geometry.assembly import Assembly, Part
+from ...geometry.assembly import Part
 from ...mjcf.scenery import boundary_lines
 from ...simulation.scene import Scene
-from ...transforms import Array, quaternion_from_matrix, translated
+from ...transforms import Array, quaternion_from_matrix, shifted, translated
 from ..cameras import FIELD_OF_VIEW, box_corners, fitted, named_direction
 
 if TYPE_CHECKING:
@@ -41,10 +41,10 @@ class WebScene:
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
         self._server = server
         self._extent = scene.extent
-        # Pages know single precision only: they show the scene about its own origin.
+        # Pages know single precision only: they show the scene about its own origin, and meshes about theirs.
         self._origin = scene.origin
         assembly = scene.compiled.assembly
-        self._link_names = scene.link_names
+        self._links = assembly.links
         fixed = (*assembly.obstacles, *assembly.surfaces)
         self._colours = {p.name: _colour(scene, p) for p in assembly.parts()}
         self._meshes = {p.name: self._add_mesh(i, p) for i, p in enumerate(assembly.parts())}
@@ -52,12 +52,12 @@ class WebScene:
         self._touching: frozenset[str] = frozenset()
         self._see_through = False
         for part in fixed:
-            _place(self._meshes[part.name], part.pose)
+            _place(self._meshes[part.name], part.mesh_pose)
 
     def place(self, poses: Array) -> None:
         """Put the links at their world poses, (nlinks, 4, 4)."""
-        for name, pose in zip(self._link_names, poses, strict=True):
-            _place(self._meshes[name], translated(pose, -self._origin))
+        for part, pose in zip(self._links, translated(poses, -self._origin), strict=True):
+            _place(self._meshes[part.name], shifted(pose, part.mesh.center))
 
     def mark(self, contacts: Sequence[Contact]) -> None:
         """Tint the bodies that touch, and show where they do, with normals from the link to the other body."""
@@ -96,7 +96,7 @@ class WebScene:
         # Names of files stay out of the tree of the page, in which a slash means something.
         name, mesh, colour = f"/bodies/{index}", part.mesh, self._colours[part.name]
         return self._server.scene.add_mesh_simple(
-            name, mesh.vertices + mesh.center, mesh.faces, color=colour, flat_shading=True, side="double"
+            name, mesh.vertices, mesh.faces, color=colour, flat_shading=True, side="double"
         )
 
     def _add_spheres(self, name: str, places: Array) -> None:
@@ -158,7 +158,7 @@ def set_stage(server: viser.ViserServer, scene: Scene, rows: Array) -> None:
     gradient = ((1 - share) * above + share * below).round().astype(np.uint8)
     server.scene.set_background_image(np.repeat(gradient, 2, axis=1), format="png")
     if scene.compiled.options.ground:
-        _add_ground(server, assembly)
+        _add_ground(server, scene)
     if assembly.boundary is not None:
         lines = np.array(boundary_lines(assembly.boundary, assembly))
         server.scene.add_line_segments("/boundary", lines, _WIRE, thickness=1.2, thickness_units="screen")
@@ -185,12 +185,11 @@ def _place_camera(server: viser.ViserServer, lower: Array, upper: Array) -> None
     camera.position, camera.look_at, camera.up = position, position + distance * forward, (0.0, 0.0, 1.0)
 
 
-def _add_ground(server: viser.ViserServer, assembly: Assembly) -> None:
-    x, y, _ = (assembly.lower + assembly.upper) / 2
-    size = 2 * assembly.extent
+def _add_ground(server: viser.ViserServer, scene: Scene) -> None:
+    size = 2 * scene.extent
     server.scene.add_grid(
         "/ground", size, size, cell_size=size / 40, section_size=size / 8, cell_color=_WIRE, section_color=_WIRE,
-        position=(x, y, assembly.lower[2]),
+        position=scene.model.geom("ground").pos,
     )  # fmt: skip
 
 
