@@ -198,18 +198,6 @@ def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:
     assert scene.model.opt.timestep == 1e-3
 
 
-def test_the_ground_lies_below_start_and_goal(tmp_path: Path) -> None:
-    (tmp_path / "a.query").write_text("0 0 0 0 0 0\n0 0 -7 0.25 0 0\n")
-    scene = env2mjcf.load(write_scene(tmp_path, free_cube("5 0 0 0 0 0")), query=tmp_path / "a.query", ground=True)
-    lowest = min(
-        float((part.used_vertices @ pose[:3, :3].T + pose[:3, 3])[:, 2].min())
-        for q in scene.queries[0].q
-        for part, pose in zip(scene.compiled.assembly.links, scene.link_poses(q), strict=True)
-    )
-    height = float(scene.model.geom("ground").pos[2])
-    assert lowest - 2e-3 * scene.extent < height < lowest
-
-
 def test_a_ground_beside_gravity_is_reported(tmp_path: Path) -> None:
     path = write_scene(tmp_path, free_cube("5 0 0 0 0 0"))
     for gravity, told in (((0, 0, -9.81), 0), ((9.81, 0, 0), 1), ((0, 0, 3.0), 1), ((0, 0, 0), 0)):
