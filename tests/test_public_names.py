@@ -53,6 +53,14 @@ CHANGED: dict[str, str] = {
         ("names/env2mjcf.model/Task/fields", "names/env2mjcf.model/Task/constructor/parameters"),
         "a task has several `robots`, of which `robot` is the first",
     ),
+    **dict.fromkeys(
+        (
+            "names/env2mjcf/Limits/constructor/parameters",
+            "options/Limits/bodies",
+            *(f"commands/{verb}/flags/--limits.bodies/default" for verb in (*_VERBS, "translate")),
+        ),
+        "20,000 bodies: the time of MuJoCo's parser grows with their square",
+    ),
 }
 
 ROOT = Path(__file__).resolve().parents[1]

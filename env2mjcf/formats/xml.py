@@ -180,8 +180,9 @@ class Node:
         if others:
             first, one = next(iter(others.values())), len(others) == 1
             message = f"{enumeration(list(others))} of <{self.tag}> {'is' if one else 'are'} not used"
-            hint = did_you_mean(first.tag, known) if one else ""
-            self.log.info("ENV307", f"<{first.tag}>", message, hint=hint, span=first.span)
+            self.log.info(
+                "ENV307", f"<{first.tag}>", message, hint=did_you_mean(first.tag, known) * one, span=first.span
+            )
 
     def ignore_other_attributes(self, *known: str) -> None:
         """Report the attributes that nothing reads, once for each name and kind of element in a file."""
@@ -190,15 +191,14 @@ class Node:
         for name in others:
             span = self.source.span(*places[name]) if name in places else self.span
             message = f"attribute {name!r} of <{self.tag}> is not used"
-            if _PAIR_RULES.fullmatch(name.lower()):
-                hint = did_you_mean(name, known)
-                if self.tag.lower() != "collisiondetection":
-                    hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
-                    message += ": it counts on <CollisionDetection>"
-                self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
-            else:
-                hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
+            hint = did_you_mean(name, known) if self.log.keeps("ENV311", Severity.INFO) else ""
+            if not _PAIR_RULES.fullmatch(name.lower()):
                 self.log.info("ENV311", f"<{self.tag}>", message, hint=hint, span=span)
+                continue
+            if self.tag.lower() != "collisiondetection":
+                hint = "write it there, or give the option: self_collision, adjacent_links or inter_robot"
+                message += ": it counts on <CollisionDetection>"
+            self.log.warn("ENV185", f"<{self.tag}>", message, hint=hint, span=span)
 
     def _first(self, name: str) -> bool:
         """Whether something of this name in elements of this kind was not told before."""
