@@ -173,16 +173,13 @@ class Node:
 
     def ignore_other_children(self, *known: str) -> None:
         """Report the child elements that nothing reads, one of each kind in a file, all in one diagnostic."""
-        folded, others = {k.lower() for k in known}, dict[str, Node]()
-        for child in self.children():
-            if child.tag.lower() not in folded and self._first(f"<{child.tag}>"):
-                others[f"<{child.tag}>"] = child
+        folded, children = {k.lower() for k in known}, self.children()
+        others = {f"<{c.tag}>": c for c in children if c.tag.lower() not in folded and self._first(f"<{c.tag}>")}
         if others:
             first, one = next(iter(others.values())), len(others) == 1
             message = f"{enumeration(list(others))} of <{self.tag}> {'is' if one else 'are'} not used"
-            self.log.info(
-                "ENV307", f"<{first.tag}>", message, hint=did_you_mean(first.tag, known) * one, span=first.span
-            )
+            hint = did_you_mean(first.tag, known) if one else ""
+            self.log.info("ENV307", f"<{first.tag}>", message, hint=hint, span=first.span)
 
     def ignore_other_attributes(self, *known: str) -> None:
         """Report the attributes that nothing reads, once for each name and kind of element in a file."""
