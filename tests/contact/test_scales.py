@@ -8,10 +8,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from real_scenes import FEW, real_scene, scene_names
+from scenes import MODELS, box_mesh, write_scene
 
 import env2mjcf
-from tests.support.real_scenes import FEW, real_scene, scene_names
-from tests.support.scenes import MODELS, box_mesh, write_scene
 
 PLAY = 0.05
 MOVED = np.array([0.05, 0.02, 0.03])

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from chains import write_chain
+from real_scenes import real_scene, scene_names
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
@@ -69,6 +70,21 @@ def test_robots_of_ours_hold_and_follow(path: str) -> None:
         assert swing < 0.01
         assert error < 0.05
         assert over < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scene_names())
+def test_real_robots_hold_and_follow_and_keep_their_energy(corpus: Path, name: str) -> None:
+    real = real_scene(name)
+    scene = env2mjcf.load(real.env, actuators="position", **real.keywords)
+    if not scene.model.nu:
+        pytest.skip("no joints")
+    for by in (0.0, 0.3):
+        swing, error, over = follow(scene, by, 5.0)
+        assert swing < 0.01
+        assert error < 0.05
+        assert over < 0.05
+    assert energy_gain(env2mjcf.load(real.env, **real.keywords), 60.0) < 0.01
 
 
 @pytest.mark.parametrize("path", JOINTED)
@@ -174,10 +190,8 @@ def test_sensors_and_tools_are_written_on_request() -> None:
     assert [several.site(i).name for i in range(several.nsite)] == ["robot0/tool", "robot1/tool"]
 
 
-@pytest.mark.parametrize(("hinges", "seconds"), [(6, 10), (12, 60), (24, 60)])
-@pytest.mark.slow_but("6-10")
-def test_undamped_chains_keep_their_energy(hinges: int, seconds: float, tmp_path: Path) -> None:
-    scene = env2mjcf.load(write_chain(tmp_path, hinges))
+def energy_gain(scene: Scene, seconds: float) -> float:
+    """Return how much energy a scene gains from home without contacts and limits, in weights times extents."""
     model = scene.model
     model.jnt_limited[:] = 0
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -188,7 +202,13 @@ def test_undamped_chains_keep_their_energy(hinges: int, seconds: float, tmp_path
         mujoco.mj_step(model, data)
         highest = max(highest, float(data.energy.sum()))
     assert not data.warning.number.any()
-    assert highest - first < 0.01 * 9.81 * model.body_mass.sum() * scene.extent
+    return (highest - first) / (9.81 * float(model.body_mass.sum()) * scene.extent)
+
+
+@pytest.mark.parametrize(("hinges", "seconds"), [(6, 10), (12, 60), (24, 60)])
+@pytest.mark.slow_but("6-10")
+def test_undamped_chains_keep_their_energy(hinges: int, seconds: float, tmp_path: Path) -> None:
+    assert energy_gain(env2mjcf.load(write_chain(tmp_path, hinges)), seconds) < 0.01
 
 
 def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:

@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from extras import needs
+from scenes import box_mesh, write_scene
 
 import env2mjcf
 from env2mjcf.simulation.scene import Scene
 from env2mjcf.view.web.nodes import WebScene
-from tests.support.extras import needs
-from tests.support.scenes import box_mesh, write_scene
 
 FAR = np.array([512345.0, 5403210.0, 312.0])
 
