@@ -84,7 +84,9 @@ def drives(
             continue
         loops = loop_points(robot, closed)
         motion = _independent(robot, robot.home, loops)
-        driven = _driven(motion, sorted(joints))
+        chosen = _driven(motion, sorted(joints))
+        # In the order of qpos.
+        driven = [c for c in joints if c in chosen]
         names = [space.names[columns.start + c] for c in driven]
         if len(driven) < len(joints):
             message = (
