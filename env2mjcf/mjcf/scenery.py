@@ -66,15 +66,16 @@ for. Memory is not used, only reserved, until something touches."""
 _CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 20
 
 
-def possible_contacts(assembly: Assembly, pairs: PairTable, options: Options) -> NDArray[np.int64]:
+def possible_contacts(assembly: Assembly, pairs: PairTable) -> NDArray[np.int64]:
     """Return how many contacts each tested pair of bodies can have in MuJoCo, about and at most, (npairs,)."""
-    cells = {p.name: _cells(p, options) for p in assembly.parts()}
+    # A box that stands for a body is one piece of it, too.
+    cells = {p.name: len(p.shape.pieces) if p.shape else 0 for p in assembly.parts()}
     both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
     a, b = both.T
     return np.minimum(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * np.maximum(a, b))
 
 
-def memory(assembly: Assembly, pairs: PairTable, options: Options) -> int:
+def memory(assembly: Assembly, pairs: PairTable) -> int:
     """Return how many bytes MuJoCo needs for the contacts that a scene can have; 0 where its own choice will do.
 
     A contact has 0.6 kB, and four rows of forces of 0.25 kB and 24 bytes for each degree of freedom that it acts on.
@@ -82,19 +83,13 @@ def memory(assembly: Assembly, pairs: PairTable, options: Options) -> int:
     motions = {n: r.kinematics.dim for r in assembly.robots for n in r.names}
     moved = [motions[p.link] + (motions[p.other] if p.kind == "robot" else 0) for p in pairs.tested]
     row = 250 + 24 * np.array(moved, dtype=np.int64)
-    needed = int(possible_contacts(assembly, pairs, options) @ (624 + 4 * row))
+    needed = int(possible_contacts(assembly, pairs) @ (624 + 4 * row))
     if needed <= LEAST_MEMORY:
         return 0
     # What MuJoCo would choose, at most: its solver needs room, too.
     total = sum(r.kinematics.dim for r in assembly.robots)
     chosen = (16 << 20) + 36_000 * total + 72 * total * total
     return 0 if chosen > MOST_MEMORY else min(1 << (chosen + needed - 1).bit_length(), MOST_MEMORY)
-
-
-def _cells(part: Part, options: Options) -> int:
-    if part.shape is None:
-        return 0
-    return 1 if options.primitives and part.analysis.box is not None else len(part.shape.pieces)
 
 
 def add_settings(
@@ -134,7 +129,7 @@ def add_settings(
         # MuJoCo's is absolute: a millionth of a metre, which is here one of the extent.
         option.set("ccd_tolerance", number(float(f"{1e-6 * assembly.extent:.0e}")))
     add(option, "flag", filterparent="disable")
-    asked = memory(assembly, pairs, options)
+    asked = memory(assembly, pairs)
     if asked:
         add(root, "size", memory=f"{asked >> 20}M")
     center = (assembly.lower + assembly.upper) / 2

@@ -94,7 +94,7 @@ def _crowd_at_home(scene: Scene) -> int:
     pairs = compiled.pairs
     first, second = np.array([(number[p.link], number[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2).T
     meet = np.linalg.norm(places[first] - places[second], axis=1) <= radii[first] + radii[second]
-    return int(possible_contacts(compiled.assembly, pairs, compiled.options)[meet].sum())
+    return int(possible_contacts(compiled.assembly, pairs)[meet].sum())
 
 
 def _report_shortage(scene: Scene, log: DiagnosticLog) -> None:

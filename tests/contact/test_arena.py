@@ -185,6 +185,16 @@ class TestMemory:
         spec.memory = -1
         assert scene.model.narena >= spec.compile().narena
 
+    def test_boxes_that_collide_as_surfaces_count_by_their_prisms(self, folder: Path) -> None:
+        path = write_scene(folder, free_cube("3 0 0 0 0 0"))
+        for primitives in (False, True):
+            compiled = env2mjcf.load(path, collision="surface", primitives=primitives, engine="mujoco").compiled
+            cells = [sum(n.startswith(f"{name}:") for n in compiled.document.owners) for name in ("cube", "cube_2")]
+            assert min(cells) > 1
+            # 8 contacts of two cells, at most, and 20 of each cell with the other body.
+            expected = min(8 * cells[0] * cells[1], 20 * max(cells))
+            assert scenery.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
+
     @pytest.mark.parametrize("sides", [8, pytest.param(48, marks=pytest.mark.slow)])
     def test_what_is_written_steps_in_plain_mujoco(self, folder: Path, sides: int) -> None:
         result = env2mjcf.convert(eight_about_one(folder, sides), folder / "out")
