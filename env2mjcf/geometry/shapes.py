@@ -17,7 +17,7 @@ from .convexity import Box, exact_box, is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
-from .pieces import LEAST_AREA, ConvexPiece, hull_piece, hull_volume, prisms
+from .pieces import LEAST_AREA, ConvexPiece, flatness, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
@@ -163,7 +163,8 @@ def _prisms(
     omitted: list[tuple[float, float]] = []
     for inward in (True, False):
         rows = np.flatnonzero((chosen & (analysis.solids == inward))[analysis.component])
-        polygons = convex_polygons(analysis.vertices, analysis.faces[rows], analysis.tolerance)
+        flat = max(analysis.tolerance, flatness(analysis.diagonal, thickness))
+        polygons = convex_polygons(analysis.vertices, analysis.faces[rows], flat)
         made = prisms(analysis.vertices, polygons, thickness, inward=inward)
         kept = {id(piece.polygon) for piece in made}
         omitted.append(_omitted(analysis, rows, [p for p in polygons if id(p) not in kept]))

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...limits import Work
 from ..analysis import Analysis
-from ..coplanar import Polygon, convex_polygons
-from ..pieces import SLENDEREST, ConvexPiece, frozen_piece, prisms, too_narrow
+from ..coplanar import Polygon, bend, convex_polygons
+from ..pieces import SLENDEREST, ConvexPiece, flatness, frozen_piece, prisms, too_narrow
 from ..topology import Ints, edges
 from .cells import Group, cell_corners, groups
 from .fitting import Surroundings, fit
@@ -24,8 +24,8 @@ _THINNEST = 5e-6
 """Least height of a cell in units of the mesh's diagonal; below it a thin prism stands for the polygon."""
 
 _EXACT = 2e-10
-"""What counts as nothing, in units of the mesh's diagonal: bent polygons and grazing triangles, two of each at worst,
-must not add up to 1e-9."""
+"""What counts as nothing, in units of the mesh's diagonal, where no polygon is bent by more: bent polygons and grazing
+triangles, two of each at worst, must not add up to 1e-9."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +67,8 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     vertices, chosen = analysis.vertices, analysis.faces[faces]
     nothing = _EXACT * analysis.diagonal
     table = edges(chosen)
-    polygons = convex_polygons(vertices, chosen, nothing, table)
+    polygons = convex_polygons(vertices, chosen, max(nothing, flatness(analysis.diagonal, thickness)), table)
+    nothing = max(nothing, bend(vertices, polygons))
     normals = np.empty((len(chosen), 3))
     for polygon in polygons:
         normals[list(polygon.faces)] = polygon.normal

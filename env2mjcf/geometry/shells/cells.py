@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..coplanar import Polygon
-from ..pieces import by_length, corner_loops
+from ..pieces import by_length, corner_loops, flattened
 from ..topology import Bools, Floats, Ints
 
 PARALLEL = 1e-9
@@ -124,7 +124,7 @@ def groups(vertices: Floats, faces: Ints, polygons: Sequence[Polygon], face_slop
 def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, height: float) -> Group:
     """Set up a group from its polygons' corners (g, k, 3) in the mesh's frame, normals (g, 3) and slopes (g, k)."""
     centers = corners.mean(axis=1)
-    local = corners - centers[:, None]
+    local = flattened(corners - centers[:, None], normals)
     along = np.roll(local, -1, axis=1) - local
     inward = np.cross(normals[:, None], along / np.linalg.norm(along, axis=2, keepdims=True))
     inward /= np.linalg.norm(inward, axis=2, keepdims=True)
