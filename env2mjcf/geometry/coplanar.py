@@ -107,7 +107,8 @@ def _candidates(
     left, right = here // 3, there // 3
     a, b = faces[left, here % 3], faces[left, (here + 1) % 3]
     length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    order = np.lexsort((edge, -length))
+    # Lengths that differ by no more than the tolerance are one, so that noise does not decide the order.
+    order = np.lexsort((edge, -np.round(length / max(tolerance, np.finfo(np.float64).tiny))))
     return np.column_stack([left, right, a, b])[order].tolist()
 
 

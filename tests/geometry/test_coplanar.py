@@ -198,11 +198,11 @@ def test_a_sheet_that_is_flat_to_the_tolerance_is_as_good_as_flat(seed: int) -> 
     flat = [sheet.vertices[list(p.loop)] for p in polygons]
     areas = [np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)[2] / 2 for p in flat]
     assert sum(areas) == pytest.approx(np.prod(np.ptp(sheet.vertices, axis=0)[:2]), rel=1e-12)
-    # Three times as rough, it is not.
-    assert len(convex_polygons(sheet.vertices + 3 * (rough - sheet.vertices), sheet.faces, tolerance)) > 8
+    # Ten times as rough, it is not.
+    assert len(convex_polygons(sheet.vertices + 10 * (rough - sheet.vertices), sheet.faces, tolerance)) > 8
 
 
-@pytest.mark.parametrize("bend", [0.5, 3.0])
+@pytest.mark.parametrize("bend", [0.5, 12.0])
 def test_a_corner_is_off_the_plane_by_no_more_than_the_tolerance(bend: float) -> None:
     """A strip that bends evenly: cut where the chord of its parabola is as high as the tolerance allows."""
     n, tolerance = 40, 1e-5
