@@ -22,7 +22,15 @@ from .geoms import add_contacts, excluded_obstacles
 from .links import Compilation, add_obstacles, add_robot
 from .loops import CLOSED, add_loops
 from .markup import Element, add, comment_text, number, numbers, plain, to_text
-from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file, time_step
+from .scenery import (
+    add_ground_material,
+    add_scenery,
+    add_settings,
+    add_sky,
+    gravity_of_file,
+    report_contacts,
+    time_step,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +82,7 @@ def compile_mjcf(
     if options.sensors:
         add_sensors(root, space)
     _report_unused(assembly, options, log)
+    report_contacts(assembly, pairs, step, damped=bool(damped), log=log)
     _add_keyframes(root, space, keys, driven if options.actuators == "position" else {})
     text = to_text(root)
     return Document(

@@ -191,8 +191,8 @@ class TestMemory:
             compiled = env2mjcf.load(path, collision="surface", primitives=primitives, engine="mujoco").compiled
             cells = [sum(n.startswith(f"{name}:") for n in compiled.document.owners) for name in ("cube", "cube_2")]
             assert min(cells) > 1
-            # 8 contacts of two cells, at most, and 20 of each cell with the other body.
-            expected = min(8 * cells[0] * cells[1], 20 * max(cells))
+            # 8 contacts of two cells, at most, and 28 of each cell with the other body.
+            expected = min(8 * cells[0] * cells[1], 28 * max(cells))
             assert scenery.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
 
     @pytest.mark.parametrize("sides", [8, pytest.param(48, marks=pytest.mark.slow)])

@@ -209,7 +209,9 @@ def test_a_corner_is_off_the_plane_by_no_more_than_the_tolerance(bend: float) ->
     x = np.arange(n + 1.0)
     vertices = np.array([[a, b, bend * tolerance * (a / n) ** 2] for a in x for b in (0.0, 1.0)])
     first = 2 * np.arange(n)
-    faces = np.concatenate([np.column_stack([first, first + 2, first + 3]), np.column_stack([first, first + 3, first + 1])])
+    faces = np.concatenate(
+        [np.column_stack([first, first + 2, first + 3]), np.column_stack([first, first + 3, first + 1])]
+    )
     polygons = convex_polygons(vertices, faces, tolerance)
     assert (len(polygons) == 1) == (bend < 1)
     for polygon in polygons:
