@@ -1,13 +1,15 @@
-"""Tell what contacts cost MuJoCo, and what it feels: `python benchmarks/contact_cost.py PYTHON [PYTHON] [--scenes ...]`.
+"""Tell what contacts cost MuJoCo, and what it feels: `python benchmarks/contact_cost.py PYTHON [PYTHON] [--scenes]`.
 
 Each scene of `models/`, and of the folder that ENV2MJCF_CORPUS names, is loaded with the first PYTHON, of an older
 installation, and then with the second one; a "python" may be a command, such as "env PYTHONPATH=/a/tree python3".
+`--sweep` adds a table of the last one with other sizes of cells, on a few scenes.
 `--output` names the page, `benchmarks/contact-cost.md` by default where all scenes are measured.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import shlex
@@ -21,6 +23,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from machine import machine
 from table import Case, corpus_cases, model_cases
 
 OUTPUT = Path(__file__).with_name("contact-cost.md")
@@ -38,6 +41,25 @@ only what is used is real. Full: of {poses:,} random poses, those at which conta
 of poses that collide, and of those in which a body lies wholly within a solid, by the exact engine, the share at which
 MuJoCo has a contact; up to {asked} poses each. A row with one figure has no second one, or twice the same.
 """
+
+# Other sizes of cells, as module, name and value: depths in units of the mesh's diagonal, how far polygons that are one
+# cell may be bent in units of the thickness of prisms.
+_CELLS, _PIECES = "env2mjcf.geometry.shells.cells", "env2mjcf.geometry.pieces"
+SWEEP: dict[str, list[tuple[str, str, float]]] = {
+    "as it is: 0.02 to 0.2 deep, merged": [],
+    "not merged": [(_PIECES, "_FLAT_PER_THICKNESS", 0.0)],
+    "merged up to half the thickness": [(_PIECES, "_FLAT_PER_THICKNESS", 0.5)],
+    "0.005 to 0.2 deep": [(_CELLS, "SHALLOWEST", 0.005)],
+    "0.01 to 0.2 deep": [(_CELLS, "SHALLOWEST", 0.01)],
+    "0.02 deep": [(_CELLS, "DEEPEST", 0.02)],
+    "0.02 to 0.05 deep": [(_CELLS, "DEEPEST", 0.05)],
+    "0.02 to 0.1 deep": [(_CELLS, "DEEPEST", 0.1)],
+    "0.02 to 0.5 deep": [(_CELLS, "DEEPEST", 0.5)],
+}
+SWEPT = (
+    "bug-trap", "gantry", "LTunnel.tunnel", "Maze.maze", "STunnel.tunnel", "alpha1.6.alpha", "bug_trap1.0.bug-trap",
+    "ros2-factory_simulation.ppl_files.factory_patrol",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,24 +183,37 @@ class _Looks:
         return int(sum(self._data.warning[int(kind)].number for kind in kinds))
 
 
-def asked(python: str, case: Case) -> Cost | str:
-    """Return what a scene comes to with one installation, or why there is none."""
+def asked(python: str, case: Case, settings: Sequence[tuple[str, str, float]] = ()) -> Cost | str:
+    """Return what a scene comes to with one installation and changed settings, or why there is none."""
     options = json.dumps({k: v for k, v in case.options.items() if k != "query"}, default=os.fspath)
-    words = [*shlex.split(python), str(Path(__file__).resolve()), "--work", str(case.path), options]
+    words = [
+        *shlex.split(python),
+        str(Path(__file__).resolve()),
+        "--work",
+        str(case.path),
+        options,
+        json.dumps(settings),
+    ]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
-    return Cost(**json.loads(done.stdout)) if done.returncode == 0 else (done.stderr.strip() or "?").splitlines()[-1]
+    return (
+        Cost(**json.loads(done.stdout))
+        if done.returncode == 0
+        else next(
+            (line.partition(": ")[2] for line in done.stderr.splitlines() if line.startswith("env2mjcf.")), "fails"
+        )
+    )
 
 
-def row(case: Case, costs: Sequence[Cost]) -> str:
-    """Return a scene's line of the table: older / newer."""
+def row(name: str, costs: Sequence[Cost]) -> str:
+    """Return a line of the table: older / newer."""
 
-    def both(name: str, form: str, scale: float = 1) -> str:
-        values = [getattr(c, name) for c in costs]
+    def both(field: str, form: str, scale: float = 1) -> str:
+        values = [getattr(c, field) for c in costs]
         texts = ["" if v is None else format(v if scale == 1 else scale * v, form) for v in values]
         return texts[0] if len(set(texts)) == 1 else " / ".join(texts)
 
     cells = [
-        case.name.replace("_", "\\_"),
+        name.replace("_", "\\_"),
         both("geoms", "d"),
         both("contacts", ".0f"),
         both("most", "d"),
@@ -194,10 +229,33 @@ def row(case: Case, costs: Sequence[Cost]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-HEADER = (
-    "| scene | geoms | contacts | most | step | ratio | load, s | model, MB | arena, MB | full | felt, % | contained, % |\n"
-    "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+_NAMES = (
+    "geoms",
+    "contacts",
+    "most",
+    "step",
+    "ratio",
+    "load, s",
+    "model, MB",
+    "arena, MB",
+    "full",
+    "felt, %",
+    "contained, %",
 )
+HEADER = f"| scene | {' | '.join(_NAMES)} |\n| --- |{' ---: |' * len(_NAMES)}"
+
+
+def sweep(python: str, cases: Sequence[Case]) -> list[str]:
+    """Return the lines of the table of other cells: for each scene what it comes to as it is / with them."""
+    lines = [HEADER]
+    for case in (case for case in cases if case.name in SWEPT):
+        usual = asked(python, case)
+        for name, settings in SWEEP.items():
+            found = asked(python, case, settings) if settings else usual
+            costs = [c for c in ([usual, found] if settings else [usual]) if isinstance(c, Cost)]
+            lines.append(row(f"{case.name}: {name}", costs))
+            print(lines[-1], flush=True)
+    return lines
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -205,30 +263,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pythons", nargs="+", metavar="PYTHON", help="of the old installation, and of the new one")
     parser.add_argument("--scenes", nargs="*", help="names, or parts of names; all by default")
+    parser.add_argument("--sweep", action="store_true", help="measure other sizes of cells, too")
     parser.add_argument("--output", type=Path, help="where the page is written")
     chosen = parser.parse_args(arguments)
     corpus = os.environ.get("ENV2MJCF_CORPUS")
     cases = [*model_cases(), *(corpus_cases(Path(corpus)) if corpus else ())]
-    if chosen.scenes:
+    if chosen.scenes is not None:
         cases = [c for c in cases if any(part in c.name for part in chosen.scenes)]
-    lines, kept = [], {}
     print(HEADER, flush=True)
+    lines, left_out = [HEADER], []
     for case in cases:
         found = [asked(python, case) for python in chosen.pythons[:2]]
         costs = [f for f in found if isinstance(f, Cost)]
-        lines.append(row(case, costs) if len(costs) == len(found) else f"| {case.name} | {found[-1]} |")
-        kept[case.name] = [asdict(c) for c in costs]
+        if len(costs) < len(found):
+            left_out.append(case.name)
+            continue
+        lines.append(row(case.name, costs))
         print(lines[-1], flush=True)
+    page = [
+        "# What contacts cost",
+        "",
+        "Made by `benchmarks/contact_cost.py`: older / newer installation. " + machine(),
+    ]
+    page += ["", LEGEND.format(stepped=STEPPED, poses=POSES, asked=ASKED).strip(), "", *lines, ""]
+    if left_out:
+        page += [f"Scenes that do not convert: {', '.join(left_out)}.", ""]
+    if chosen.sweep:
+        page += ["## Other sizes of cells", "", "As it is / with other cells.", ""]
+        page += [*sweep(chosen.pythons[-1], cases), ""]
     output = chosen.output or (None if chosen.scenes else OUTPUT)
     if output is not None:
-        legend = LEGEND.format(stepped=STEPPED, poses=POSES, asked=ASKED).strip()
-        title = "# What contacts cost\n\nMade by `benchmarks/contact_cost.py`: older / newer installation."
-        output.write_text("\n".join([title, "", legend, "", HEADER, *lines, ""]), encoding="utf-8")
+        output.write_text("\n".join(page), encoding="utf-8")
     return 0
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--work"]:
+        for module, name, value in json.loads(sys.argv[4]):
+            setattr(importlib.import_module(module), name, value)
         print(json.dumps(asdict(cost(sys.argv[2], json.loads(sys.argv[3])))))
         sys.exit(0)
     sys.exit(main())

@@ -26,9 +26,9 @@ LEAST_WIDTH = 1e-7
 LEAST_AREA = 2e-14
 """Least area of a mesh in square metres that MuJoCo takes, with room for rounding."""
 
-# How far a corner of a polygon may be off its plane, in units of the thickness, and of the mesh's diagonal at most. A cell
-# is off by as much at its top, at its sides, which follow the neighbours, and where it grazes others: together less than
-# half of the thickness.
+# How far a corner of a polygon may be off its plane, in units of the thickness, and of the diagonal at most. A cell
+# is off by as much at its top, at its sides, which follow the neighbours, and where it grazes others: together less
+# than half of the thickness.
 _FLAT_PER_THICKNESS, _FLATTEST = 0.1, 1e-6
 
 _BLOCK = 2_000_000  # distances from corners to edges that are computed at once

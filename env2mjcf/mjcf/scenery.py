@@ -59,12 +59,12 @@ def _thickness(part: Part) -> float:
     return max(float(np.min(np.ptp(used, axis=0))), part.mesh.diagonal / 20)
 
 
-LEAST_MEMORY, MOST_MEMORY = 8 << 20, 1 << 30
+LEAST_MEMORY, MOST_MEMORY = 8 << 20, 2 << 30
 """Bytes of contacts and their forces: up to these MuJoCo's own choice of memory will do, and beyond those none is asked
 for. Memory is not used, only reserved, until something touches."""
 
 # Measured on shells in one place: contacts of two cells, and of the cells of one body with another body.
-_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 28
+_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 40
 
 # Measured on the corpus: bodies of a and b cells that are pressed into each other at random have up to so many times
 # the root of a b contacts, and MuJoCo takes so many seconds for each, nine tenths of them to find it.
@@ -141,7 +141,7 @@ def report_contacts(assembly: Assembly, pairs: PairTable, step: float, *, damped
     needed = contact_memory(assembly, pairs)
     if needed > MOST_MEMORY:
         message = (
-            f"if all bodies that may touch do so at once, MuJoCo needs {needed / 2**30:.2g} GiB for their contacts, and "
+            f"if all bodies that may touch do so at once, MuJoCo needs {needed / 2**30:.2g} GiB for the contacts, and "
             f"gets {MOST_MEMORY / 2**30:g}: it warns where that is full, and contacts do not act"
         )
         log.info("MJC419", name, message, hint=f"{_QUICKER}, or raise <size memory=...> in the MJCF")
