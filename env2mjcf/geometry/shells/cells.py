@@ -151,7 +151,8 @@ def groups(
         vertices: (n, 3).
         faces: (m, 3).
         polygons: Convex polygons of whole faces.
-        face_slopes, face_lips: (m, 3) of `Sides`.
+        face_slopes: (m, 3) `Sides.slopes`.
+        face_lips: (m, 3) `Sides.lips`.
         diagonal: Of the mesh.
     """
     loops = corner_loops(vertices, polygons)
@@ -166,8 +167,15 @@ def groups(
 
 
 def group_of(members: Ints, corners: Floats, normals: Floats, slopes: Floats, lips: Floats, diagonal: float) -> Group:
-    """Set up a group, as deep as may be, from its polygons' corners (g, k, 3) in the mesh's frame, normals (g, 3), slopes
-    and lips (g, k) each.
+    """Set up a group of cells as deep as may be.
+
+    Args:
+        members: (g,) numbers of the polygons.
+        corners: (g, k, 3) in the mesh's frame.
+        normals: (g, 3).
+        slopes: (g, k).
+        lips: (g, k).
+        diagonal: Of the mesh.
     """
     centers = corners.mean(axis=1)
     local = flattened(corners - centers[:, None], normals)

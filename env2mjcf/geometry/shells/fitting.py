@@ -117,8 +117,8 @@ class Surroundings:
 def fit(group: Group, around: Surroundings) -> None:
     """Lower cells, or tilt their sides, until no triangle is left in them.
 
-    Sides are tilted for the sake of the least depth only, since a body that lies on a face touches with the tilted sides
-    of the cells next to it: further down, cells are as deep as their sides let them be.
+    Sides are tilted for the sake of a shallow cell only, because tilted ones catch bodies: where a face slides, those
+    of the faces next to it stand on the ground with an edge. Deeper cells keep the sides that they have.
 
     A cell has its outer face in common with the solid, so that its points near there are inside, and it is convex: a
     path to any other of its points would leave the solid through a face within the cell. So a cell that no face

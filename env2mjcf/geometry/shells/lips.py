@@ -30,6 +30,9 @@ _TURNS = (0.15, 0.5, 0.85)
 _ROUNDS = 60
 _ROUNDING = 1e-9
 
+_NOTHING = 0.01
+"""Length that counts as none, in units of the margin."""
+
 
 def lipped(
     group: Group, rows: Ints, around: Surroundings, diagonal: float, tolerance: float
@@ -52,8 +55,7 @@ def lipped(
             if len(todo) == 0:
                 return
             cells = _bent(group, todo, share * _DEPTH * diagonal, rounded)
-            free = _make_way(cells, around) if rounded else np.ones(len(todo), dtype=np.bool_)
-            free[free] = ~reached(cells.some(free), around)
+            free = _make_way(cells, around) if rounded else ~reached(cells, around)
             corners = cell_corners(cells.some(free), tolerance)
             left = np.ones(len(todo), dtype=np.bool_)
             for i, row in enumerate(np.flatnonzero(free).tolist()):
@@ -74,7 +76,7 @@ def _bent(group: Group, rows: Ints, depth: float, rounded: bool) -> Group:
         end = np.einsum("gktj,gkj->gkt", sides, speeds)
         near = (wants | np.roll(wants, 1, axis=1))[:, :, None]
         flat = np.where(near, np.minimum(FLAT, end), end)
-        g, k = slopes.shape
+        g = len(slopes)
         slopes = np.concatenate([flat, slopes[:, :, None]], axis=2).reshape(g, -1)
         ends = np.concatenate([end, ends[:, :, None]], axis=2).reshape(g, -1)
         inward = np.concatenate([sides, inward[:, :, None]], axis=2).reshape(g, -1, 3)
@@ -102,7 +104,7 @@ def _walls(cells: Group) -> Floats:
 
 
 def _corner_sides(group: Group) -> Floats:
-    """Return the inward vectors of sides at the corners, (g, k, t, 3), in turn from the edge before to the one after."""
+    """Return the inward vectors of sides at the corners, (g, k, t, 3), from the edge before to the one after."""
     after = group.inward
     before, normal = np.roll(after, 1, axis=1), group.normals[:, None]
     sine = np.einsum("gkj,gkj->gk", np.cross(before, after), np.broadcast_to(normal, after.shape))
@@ -111,45 +113,47 @@ def _corner_sides(group: Group) -> Floats:
 
 
 def _make_way(cells: Group, around: Surroundings) -> Bools:
-    """Steepen lips until no triangle is left in them, those of corners first; tell of which cells none is, (g,)."""
-    assert cells.bend is not None
-    lips = replace(cells, height=cells.bend, bend=None, walls=None)
-    cell, other = may_meet(lips, around)
-    of_corner = np.arange(lips.slopes.shape[1]) % (len(_TURNS) + 1) < len(_TURNS)
+    """Steepen lips until no triangle is left in the cells, those of corners first; tell in which none is, (g,)."""
+    cell, other = may_meet(cells, around)
+    lost = np.zeros(len(cells), dtype=np.bool_)
     for _ in range(_ROUNDS):
         if len(cell) == 0:
             break
-        found = [_asked(lips, cells.lips, of_corner, *block) for block in within(lips, around, cell, other)]
+        found = [_asked(cells, around, *block) for block in within(cells, around, cell, other)]
         cell, other, side, slope = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        if len(cell) == 0:
-            break
         order = np.lexsort((-slope, cell))
-        first = order[np.concatenate([[True], np.diff(cell[order]) > 0])]
-        able = first[np.isfinite(slope[first])]
-        lips.slopes[cell[able], side[able]] = slope[able]
-        lost = np.isin(cell, cell[first[~np.isfinite(slope[first])]])
-        lips.height[cell[lost]] = 0.0
-        cell, other = cell[~lost], other[~lost]
-    free = lips.height > 0
-    free[cell] = False
-    cells.slopes = lips.slopes
-    cells.walls = _walls(cells)
-    return free
+        first = order[np.concatenate([[True], np.diff(cell[order]) > 0])[: len(order)]]
+        able = np.isfinite(slope[first])
+        lost[cell[first[~able]]] = True
+        cells.slopes[cell[first[able]], side[first[able]]] = slope[first[able]]
+        cells.walls = _walls(cells)
+        stays = ~lost[cell]
+        cell, other = cell[stays], other[stays]
+    lost[cell] = True
+    return ~lost
 
 
 def _asked(
-    lips: Group, most: Floats, of_corner: Bools, c: Ints, t: Ints, points: Floats, count: Ints
+    cells: Group, around: Surroundings, c: Ints, t: Ints, points: Floats, count: Ints
 ) -> tuple[Ints, Ints, Ints, Floats]:
-    """Return cells, triangles, and which side must recede how much to leave each piece out; infinite if none can.
-
-    No side recedes more than it may at `most`, (g, k).
-    """
-    used = np.arange(points.shape[1]) < count[:, None]
-    depth = np.where(used, -np.einsum("nkj,nj->nk", points, lips.normals[c]), 1.0)
-    inside = np.einsum("nkj,nij->nki", points, lips.inward[c]) + lips.reach[c, None]
-    slope = np.where(used[:, :, None], inside / depth[:, :, None], -np.inf).max(axis=1)
+    """Return cells, triangles, and which lip must lean how much to leave each piece out; infinite if none can."""
+    assert cells.bend is not None
+    used = (np.arange(points.shape[1]) < count[:, None])[:, :, None]
+    depth = -np.einsum("nkj,nj->nk", points, cells.normals[c])[:, :, None]
+    inside = np.einsum("nkj,nij->nki", points, cells.inward[c]) + cells.reach[c, None]
+    bend, height, most = cells.bend[c, None, None], cells.height[c, None, None], cells.lips[c]
+    # All of a piece is beyond one plane of the side: that through the edge, or that through where it ends at the bottom.
+    share = (depth - bend) / (height - bend)
+    asked: list[Floats] = []
+    for over, per_slope in ((inside, depth), (inside - share * height * most[:, None], (1 - share) * bend)):
+        over[np.abs(over) <= _NOTHING * around.margin] = 0.0
+        needed = np.divide(over, per_slope, out=np.zeros_like(over), where=over != 0)
+        asked.append(np.where(used, needed, -np.inf).max(axis=1))
+    slope = np.minimum(*asked)
     slope += 1e-6 * np.abs(slope) + _ROUNDING
-    slope[(slope > most[c]) | (slope <= lips.slopes[c])] = np.inf
+    slope = np.where(slope <= most + 2 * _ROUNDING, np.minimum(slope, most), np.inf)
+    slope[slope <= cells.slopes[c]] = np.inf
+    of_corner = np.arange(slope.shape[1]) % (len(_TURNS) + 1) < len(_TURNS)
     corner = np.where(of_corner, slope, np.inf)
     slope = np.where(np.isfinite(corner).any(axis=1)[:, None], corner, slope)
     side = slope.argmin(axis=1)
