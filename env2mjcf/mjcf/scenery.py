@@ -67,7 +67,7 @@ for. Memory is not used, only reserved, until something touches."""
 _CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 40
 
 # Measured on the corpus: bodies of a and b cells that are pressed into each other at random have up to so many times
-# the root of a b contacts, and MuJoCo takes so many seconds for each, nine tenths of them to find it.
+# the root of a b contacts, and MuJoCo takes so many seconds for each, four fifths of them to find it.
 _CONTACTS_AT_RANDOM, _SECONDS_OF_CONTACT = 3, 3e-6
 
 
