@@ -11,6 +11,9 @@ from .cells import Group, corner_speed, corner_speeds
 
 _NUMBERS = 3_000_000  # distances between corners held in memory at once
 
+# Edges that keep their length, and those that vanish at the floor, do so to within this, as a slope and in parts of depth.
+_STEADY, _AT_ONCE = 1e-12, 1e-9
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corners:
@@ -124,14 +127,14 @@ class _Shrinking:
         side = self._along[rows]
         length = np.einsum("gkj,gkj->gk", _take(self._at[rows], after) - self._at[rows], side)
         rate = np.einsum("gkj,gkj->gk", _take(self._speed[rows], after) - self._speed[rows], side)
-        shrinks = self._left[rows] & (rate < 0)
+        shrinks = self._left[rows] & (rate < -_STEADY)
         end = np.divide(length, -rate, out=np.full(rate.shape, np.inf), where=shrinks)
         end = np.maximum(end, self._depth[rows, None])
         edge = end.argmin(axis=1)
         depth = end[np.arange(len(rows)), edge]
         floor = self._floor[rows]
         self._sweep(rows, np.minimum(depth, floor))
-        vanishes = depth < floor
+        vanishes = depth < (1 - _AT_ONCE) * floor
         self._busy[rows[~vanishes]] = False
         self._vanish(rows[vanishes], edge[vanishes], depth[vanishes])
         return True

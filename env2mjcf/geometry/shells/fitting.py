@@ -71,15 +71,16 @@ def _clipped(triangles: Floats, planes: Floats) -> tuple[Floats, Ints]:
     """
     points, count = triangles, np.full(len(triangles), 3, dtype=np.int64)
     for i in range(planes.shape[1]):
-        points, count = _cut(points, count, planes[:, i])
+        height = np.einsum("nkj,nj->nk", points, planes[:, i, :3]) + planes[:, i, 3:]
+        used = np.arange(points.shape[1]) < count[:, None]
+        if (used & (height < 0)).any():
+            points, count = _cut(points, count, height, used)
     return points, count
 
 
-def _cut(points: Floats, count: Ints, plane: Floats) -> tuple[Floats, Ints]:
+def _cut(points: Floats, count: Ints, height: Floats, used: Bools) -> tuple[Floats, Ints]:
     size = points.shape[1]
     slot = np.arange(size)
-    used = slot < count[:, None]
-    height = np.einsum("nkj,nj->nk", points, plane[:, :3]) + plane[:, 3:]
     after = np.where(slot + 1 < count[:, None], slot + 1, 0)
     beyond = np.take_along_axis(height, after, axis=1)
     inside = used & (height >= 0)
@@ -184,6 +185,9 @@ def within(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Itera
         c, t = cell[i : i + step], other[i : i + step]
         around.work.spend(COSTLY * len(c))
         local = around.triangles[t] - group.centers[c, None]
+        # Most of what is near a cell is the surface around its polygon.
+        below = np.flatnonzero(np.einsum("nkj,nj->nk", local, group.normals[c]).min(axis=1) < -around.margin)
+        c, t, local = c[below], t[below], local[below]
         planes = group.planes(c, around.margin)
         chosen = np.flatnonzero(~_behind_a_plane(local, planes))
         c, t, local, planes = c[chosen], t[chosen], local[chosen], planes[chosen]

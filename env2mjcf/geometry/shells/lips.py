@@ -142,7 +142,7 @@ def _asked(
     depth = -np.einsum("nkj,nj->nk", points, cells.normals[c])[:, :, None]
     inside = np.einsum("nkj,nij->nki", points, cells.inward[c]) + cells.reach[c, None]
     bend, height, most = cells.bend[c, None, None], cells.height[c, None, None], cells.lips[c]
-    # All of a piece is beyond one plane of the side: that through the edge, or that through where it ends at the bottom.
+    # All of a piece must be beyond one plane of the side: that above its bend, or that below.
     share = (depth - bend) / (height - bend)
     asked: list[Floats] = []
     for over, per_slope in ((inside, depth), (inside - share * height * most[:, None], (1 - share) * bend)):
