@@ -279,7 +279,7 @@ class TestDensePairs:
         expected = float(re.findall(r"can have ([\d,]+) contacts", said.message)[0].replace(",", ""))
         data, rng, found = mujoco.MjData(scene.model), np.random.default_rng(0), []
         for _ in range(30):
-            q = np.concatenate([[9, 0, 0] + rng.uniform(-0.4, 0.4, 3), rng.uniform(-3, 3, 3)])
+            q = np.array([9, 0, 0, 0, 0, 0]) + rng.uniform(-1, 1, 6) * [0.4, 0.4, 0.4, 3, 3, 3]
             data.qpos[:] = scene.space.qpos(q)
             mujoco.mj_kinematics(scene.model, data)
             mujoco.mj_collision(scene.model, data)
