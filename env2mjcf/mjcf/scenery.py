@@ -70,7 +70,6 @@ _CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 40
 # the root of a b contacts, and MuJoCo takes so many seconds for each, four fifths of them to find it.
 _CONTACTS_AT_RANDOM, _SECONDS_OF_CONTACT = 3, 3e-6
 
-
 # Degrees of freedom from which on MuJoCo's matrices are sparse.
 _SPARSE = 60
 
