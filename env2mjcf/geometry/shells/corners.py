@@ -11,7 +11,8 @@ from .cells import Group, corner_speed, corner_speeds
 
 _NUMBERS = 3_000_000  # distances between corners held in memory at once
 
-# Edges that keep their length, and those that vanish at the floor, do so to within this, as a slope and in parts of depth.
+# An edge keeps its length if that changes by less than this per unit of depth, and vanishes at the floor if it does so
+# within this part of its depth.
 _STEADY, _AT_ONCE = 1e-12, 1e-9
 
 

@@ -18,11 +18,11 @@ from .corners import cell_corners
 from .fitting import Surroundings, may_meet, reached, within
 from .pairing import FLAT
 
-_DEPTH = 2e-5
-"""Depth of a lip in units of the mesh's diagonal."""
+_DEPTHS = (1e-4, 2e-5, 2.5e-6)
+"""Depths of lips in units of the mesh's diagonal: the next one is tried where something of the surface is in the way.
 
-_SHARES = (1.0, 1 / 8, 1 / 64)
-"""Parts of that depth that are tried where something of the surface is in the way."""
+A body that leans forward in friction sinks into the seam further than its weight alone presses it: beyond lips of 2e-5.
+"""
 
 _TURNS = (0.15, 0.5, 0.85)
 """Where the sides at a corner stand, in parts of its turn."""
@@ -50,11 +50,11 @@ def lipped(
         tolerance: As of `cell_corners`.
     """
     todo = rows[(group.lips < group.slopes)[rows].any(axis=1)]
-    for share in _SHARES:
+    for depth in _DEPTHS:
         for rounded in (False, True):
             if len(todo) == 0:
                 return
-            cells = _bent(group, todo, share * _DEPTH * diagonal, rounded)
+            cells = _bent(group, todo, depth * diagonal, rounded)
             free = _make_way(cells, around) if rounded else ~reached(cells, around)
             corners = cell_corners(cells.some(free), tolerance)
             left = np.ones(len(todo), dtype=np.bool_)
