@@ -149,12 +149,12 @@ def _asked(
         over[np.abs(over) <= _NOTHING * around.margin] = 0.0
         needed = np.divide(over, per_slope, out=np.zeros_like(over), where=over != 0)
         asked.append(np.where(used, needed, -np.inf).max(axis=1))
-    slope = np.minimum(*asked)
+    slope: Floats = np.minimum(asked[0], asked[1])
     slope += 1e-6 * np.abs(slope) + _ROUNDING
     slope = np.where(slope <= most + 2 * _ROUNDING, np.minimum(slope, most), np.inf)
     slope[slope <= cells.slopes[c]] = np.inf
     of_corner = np.arange(slope.shape[1]) % (len(_TURNS) + 1) < len(_TURNS)
-    corner = np.where(of_corner, slope, np.inf)
-    slope = np.where(np.isfinite(corner).any(axis=1)[:, None], corner, slope)
+    at_corner = np.where(of_corner, slope, np.inf)
+    slope = np.where(np.isfinite(at_corner).any(axis=1, keepdims=True), at_corner, slope)
     side = slope.argmin(axis=1)
     return c, t, side, slope[np.arange(len(c)), side]
