@@ -149,7 +149,8 @@ def add_settings(
     comment(
         root,
         [
-            "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms." + walls,
+            "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms."
+            + walls,
             f"integrator: {why}",
             f"solref: contacts settle within {number(contact)} s, 2.5 steps: with MuJoCo's default of 0.02 s",
             "a fast body sinks deeper than thin walls are thick.",
@@ -176,7 +177,7 @@ def add_settings(
     # Thin cells have no volume to speak of; all masses are explicit.
     add(default, "mesh", inertia="shell")
     add(default, "geom", solref=f"{number(contact)} 1")
-    # Loops give way with forces, as contacts do: stiff, so that it is little.
+    # Loops give way with forces, as contacts do: stiff, so that it is less than 1e-4 of the extent where they swing.
     add(default, "equality", solref=f"{number(contact)} 1", solimp="0.99 0.9999 0.001")
     drawn = add(default, "default", class_="visual")
     add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")

@@ -67,7 +67,13 @@ SLIDERS = {
 
 
 def sliding(
-    folder: Path, slider: trimesh.Trimesh, turn: float, speed: float, step: float = 0.0, seconds: float = 1.0, flags: int = 0
+    folder: Path,
+    slider: trimesh.Trimesh,
+    turn: float,
+    speed: float,
+    step: float = 0.0,
+    seconds: float = 1.0,
+    flags: int = 0,
 ) -> np.ndarray:
     """Let a body slide along x without friction, with flags of MuJoCo; return its velocity and angular velocity."""
     flat = plate(step)
