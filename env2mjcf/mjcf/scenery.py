@@ -145,12 +145,12 @@ def add_settings(
         else "implicitfast: it takes damping implicitly."
     )
     contact = float(f"{2.5 * step:.3g}")
-    walls = "" if speed is None else f" Walls hold what is no faster than {number(speed)} m/s."
+    walls = [] if speed is None else [f"At that step walls hold what is no faster than {number(speed)} m/s."]
     comment(
         root,
         [
-            "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms."
-            + walls,
+            "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms.",
+            *walls,
             f"integrator: {why}",
             f"solref: contacts settle within {number(contact)} s, 2.5 steps: with MuJoCo's default of 0.02 s",
             "a fast body sinks deeper than thin walls are thick.",
