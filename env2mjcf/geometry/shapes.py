@@ -26,7 +26,7 @@ CONCAVE_PER_THICKNESS = 0.2
 """How far a point of a convex surface may lie inside its hull, in units of the thickness: a tenth of the band in which
 verdicts may differ from the triangles, which is two thicknesses wide."""
 
-# Triangles above which reading a file is quicker than computing its content.
+# Triangles above which reading a file is quicker than computing its content, which for cells it always is.
 _WORTH_KEEPING = 200
 
 
@@ -97,7 +97,8 @@ def collision_shape(
     subject = subject or mesh.name
     build = partial(_STRATEGIES[strategy], mesh, analysis, thickness, work or Work())
     try:
-        if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
+        slow = not analysis.convex and not analysis.flat and strategy in ("auto", "solid", "coacd")
+        if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or slow):
             what, known = ("shape", mesh.digest, strategy, thickness), {"mesh": mesh, "analysis": analysis}
             kinds = CollisionShape, ConvexPiece, Polygon, Box
             shape = cache.remember(what, build, kinds=kinds, known=known, log=log, subject=subject)

@@ -46,6 +46,18 @@ def test_mujoco_puts_links_where_the_chain_does(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("primitives", [False, True])
+def test_obstacles_stand_before_robots(path: Path, primitives: bool) -> None:
+    """MuJoCo takes the normal of the second geom's face where two are nearly parallel: that of what moves."""
+    model = env2mjcf.load(path, primitives=primitives, boundary="solid").model
+    moves = model.body_weldid[model.geom_bodyid] > 0
+    robots = np.flatnonzero(moves & (model.geom_contype > 0))
+    fixed = np.flatnonzero(~moves & (model.geom_contype == 2))  # the mask of obstacles
+    assert len(robots) > 0
+    assert fixed.max(initial=-1) < robots.min()
+
+
+@pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
 def test_every_moving_body_has_an_explicit_inertia(path: Path) -> None:
     scene = env2mjcf.load(path)
     root = etree.fromstring(scene.xml.encode())
