@@ -30,6 +30,7 @@ from .scenery import (
     gravity_of_file,
     report_contacts,
     time_step,
+    wall_speed,
 )
 
 
@@ -42,12 +43,14 @@ class Document:
         xml: The MJCF text.
         assets: Contents of the files it refers to, by path relative to it.
         owners: Name of the body that each collision geom belongs to.
+        wall_speed: Speed, m/s, up to which walls hold what moves in simulation; None where nothing can touch.
     """
 
     name: str
     xml: str
     assets: dict[str, bytes]
     owners: dict[str, str]
+    wall_speed: float | None
 
 
 def compile_mjcf(
@@ -57,6 +60,7 @@ def compile_mjcf(
     environment = assembly.environment
     keys = _keys(space, environment.tasks)
     step = time_step(assembly, options.acceleration(gravity_of_file(environment)))
+    speed = wall_speed(assembly, pairs, step)
     driven: dict[str, Drive] = {}
     if options.actuators is not None:
         driven = drives(assembly.robots, space, list(keys.values()), CLOSED * assembly.extent, step, log)
@@ -64,7 +68,7 @@ def compile_mjcf(
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs), damped)
     compilation.assets.plan([p.mesh for p in assembly.parts()])
     root = etree.Element("mujoco", model=plain(environment.name))
-    add_settings(root, assembly, pairs, options, step, damped=bool(damped))
+    add_settings(root, assembly, pairs, options, step, speed, damped=bool(damped))
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")
@@ -90,6 +94,7 @@ def compile_mjcf(
         f"{_header(assembly, options)}\n{text}",
         compilation.assets.files,
         compilation.owners,
+        speed,
     )
 
 

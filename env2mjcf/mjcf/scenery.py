@@ -53,6 +53,29 @@ def integrator(assembly: Assembly, *, damped: bool) -> str:
     return "RK4" if jointed and not damped else "implicitfast"
 
 
+def wall_speed(assembly: Assembly, pairs: PairTable, step: float) -> float | None:
+    """Return the speed, m/s, up to which walls hold what moves, however thin they are; None where nothing can touch.
+
+    MuJoCo pushes a body out of a thin wall the short way: back, unless more than half of the body is beyond it. So no
+    link may travel half its width in a step; a fifth less, because it takes more than one step to stop it.
+
+    Args:
+        assembly: The scene.
+        pairs: Which bodies are tested.
+        step: Time step, seconds.
+    """
+    names = {n for p in pairs.tested if not p.constant for n in (p.link, p.other)}
+    widths = [_width(p) for p in assembly.links if p.name in names]
+    return float(f"{0.8 * min(widths) / (2 * step):.2g}") if widths else None
+
+
+def _width(part: Part) -> float:
+    """Return the least extent of a mesh along its principal axes and along those of its frame."""
+    used = part.mesh.used_vertices
+    turned = used @ np.linalg.eigh(np.cov(used.T))[1]
+    return float(np.minimum(np.ptp(used, axis=0), np.ptp(turned, axis=0)).min())
+
+
 def _thickness(part: Part) -> float:
     """Return the least side of a mesh's box; sheets count as a twentieth of their diagonal."""
     used = part.mesh.used_vertices
@@ -152,7 +175,14 @@ def _round(value: float) -> str:
 
 
 def add_settings(
-    root: Element, assembly: Assembly, pairs: PairTable, options: Options, step: float, *, damped: bool
+    root: Element,
+    assembly: Assembly,
+    pairs: PairTable,
+    options: Options,
+    step: float,
+    speed: float | None,
+    *,
+    damped: bool,
 ) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults.
 
@@ -162,6 +192,7 @@ def add_settings(
         pairs: Which bodies are tested.
         options: Those of the conversion.
         step: Time step, seconds.
+        speed: What `wall_speed` returns.
         damped: Whether the joints have damping.
     """
     add(root, "compiler", angle="radian", autolimits="true", meshdir=ASSET_FOLDER)
@@ -173,10 +204,12 @@ def add_settings(
         else "implicitfast: it takes damping implicitly."
     )
     contact = float(f"{2.5 * step:.3g}")
+    walls = [] if speed is None else [f"At that step walls hold what is no faster than {number(speed)} m/s."]
     comment(
         root,
         [
             "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms.",
+            *walls,
             f"integrator: {why}",
             f"solref: contacts settle within {number(contact)} s, 2.5 steps: with MuJoCo's default of 0.02 s",
             "a fast body sinks deeper than thin walls are thick.",
@@ -203,7 +236,7 @@ def add_settings(
     # Thin cells have no volume to speak of; all masses are explicit.
     add(default, "mesh", inertia="shell")
     add(default, "geom", solref=f"{number(contact)} 1")
-    # Loops give way with forces, as contacts do: stiff, so that it is little.
+    # Loops give way with forces, as contacts do: stiff, so that it is less than 1e-4 of the extent where they swing.
     add(default, "equality", solref=f"{number(contact)} 1", solimp="0.99 0.9999 0.001")
     drawn = add(default, "default", class_="visual")
     add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
@@ -237,7 +270,9 @@ def add_scenery(world: Element, assembly: Assembly, options: Options, lowest: fl
         # Slightly below the lowest point, so that nothing starts in contact with it.
         pos = numbers((center[0], center[1], lowest - 1e-3 * extent))
         size = numbers((extent, extent, extent / 20))
-        add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size)
+        # What is wedged between it and an obstacle gives way on the other side: stiffer than all else.
+        stiff = {"priority": "1", "solimp": "0.999 0.9999 0.001"}
+        add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size, **stiff)
     boundary = assembly.boundary
     if boundary is not None and options.boundary == "visual":
         add_wires(world, boundary, assembly)

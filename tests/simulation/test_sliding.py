@@ -66,8 +66,16 @@ SLIDERS = {
 }
 
 
-def sliding(folder: Path, slider: trimesh.Trimesh, turn: float, speed: float, step: float = 0.0) -> np.ndarray:
-    """Let a body slide along x for a second without friction; return its velocity and angular velocity."""
+def sliding(
+    folder: Path,
+    slider: trimesh.Trimesh,
+    turn: float,
+    speed: float,
+    step: float = 0.0,
+    seconds: float = 1.0,
+    flags: int = 0,
+) -> np.ndarray:
+    """Let a body slide along x without friction, with flags of MuJoCo; return its velocity and angular velocity."""
     flat = plate(step)
     # The planner puts the mean of a mesh's vertices at its pose.
     x, y, z = flat.vertices.mean(axis=0).tolist()
@@ -83,12 +91,13 @@ def sliding(folder: Path, slider: trimesh.Trimesh, turn: float, speed: float, st
     )
     model, data = scene.model, scene.data
     model.geom_condim[:] = 1
+    model.opt.enableflags |= flags
     low = float((slider.vertices - slider.vertices.mean(axis=0))[:, 2].min())
     scene.set(np.array([0, 0, -low, 0, 0, turn]))
     while data.time < 0.3:
         mujoco.mj_step(model, data)
     data.qvel[:] = [speed, 0, 0, 0, 0, 0]
-    while data.time < 1.3:
+    while data.time < 0.3 + seconds:
         mujoco.mj_step(model, data)
     assert not data.warning.number.any()
     return data.qvel.copy()
