@@ -11,6 +11,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
@@ -157,6 +158,20 @@ def test_a_scene_is_sent_where_it_is_asked_for_and_not_again(cubes: env2mjcf.Sce
     # A worker that has forgotten, because it is a new process or has had many scenes, is sent the scene again.
     remote._memory.clear()
     np.testing.assert_array_equal(cubes.in_collision(q, executor=recorder), expected)
+
+
+def test_a_worker_keeps_the_scenes_that_it_used_last() -> None:
+    memory = remote._Memory()
+
+    def scene(k: int) -> bytes:
+        return zlib.compress(pickle.dumps(f"scene {k}"))
+
+    for k in range(4):
+        assert memory.find(str(k), scene(k)) == f"scene {k}"
+    assert memory.find("0", None) == "scene 0"
+    # The fifth takes the place of the one that was used longest ago.
+    assert memory.find("4", scene(4)) == "scene 4"
+    assert [memory.find(str(k), None) for k in range(5)] == ["scene 0", None, "scene 2", "scene 3", "scene 4"]
 
 
 def test_two_scenes_are_never_taken_for_each_other(tmp_path: Path) -> None:

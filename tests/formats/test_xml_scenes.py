@@ -12,6 +12,7 @@ from texts import PROBLEM, ROBOT, XML_ENVIRONMENT, XML_ROBOT, B, E, Reader, code
 
 import env2mjcf
 from env2mjcf.errors import Severity
+from env2mjcf.formats import xml
 from env2mjcf.kinematics.forward import RobotKinematics
 from env2mjcf.limits import Limits
 from env2mjcf.model.environment import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
@@ -529,6 +530,27 @@ def test_what_is_not_well_formed_is_refused(read: Reader, text: str) -> None:
 
 def test_deep_nesting_is_refused_not_recursed(read: Reader) -> None:
     assert fault(read, "<Environment>" + "<a>" * 100_000 + "</a>" * 100_000 + "</Environment>").code == "ENV180"
+
+
+@pytest.mark.parametrize("text", ["<a>" * 100_000, "<Environment>" + "<a/>" * 100_000])
+def test_a_hostile_text_is_refused_before_most_of_it_is_parsed(
+    read: Reader, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fed: list[int] = []
+    parser = xml.etree.XMLPullParser
+
+    class Counting:
+        def __init__(self, *arguments: object, **options: object) -> None:
+            self.parser = parser(*arguments, **options)
+            self.read_events, self.close = self.parser.read_events, self.parser.close
+
+        def feed(self, data: bytes) -> None:
+            fed.append(len(data))
+            self.parser.feed(data)
+
+    monkeypatch.setattr(xml.etree, "XMLPullParser", Counting)
+    assert fault(read, text, limits=Limits(elements=1000)).code == "ENV180"
+    assert sum(fed) < len(text) / 10
 
 
 def test_an_xml_file_cannot_be_forced_into_another_dialect(read: Reader) -> None:

@@ -97,7 +97,7 @@ class Copy:
         shutil.rmtree(self.root / ".hypothesis", ignore_errors=True)
         chosen = self.root.parent / "arguments.txt"
         chosen.write_text("\n".join(arguments))
-        common = ["-p", "no:cacheprovider", "--hypothesis-seed=0", "--tb=line", "-q", f"@{chosen}"]
+        common = ["-p", "no:cacheprovider", "--hypothesis-seed=0", "--tb=line", f"@{chosen}"]
 
         def limit() -> None:
             resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))

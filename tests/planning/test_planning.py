@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from real_scenes import real_scene, scene_names
-from scenes import write_scene
+from scenes import box_mesh, write_scene
 from truth import Truth
 
 import env2mjcf
@@ -295,6 +295,31 @@ def test_thin_walls_are_not_passed_over(tmp_path: Path):
     assert found.solved
     assert_free_by_triangles(scene, found.path, 0.02)
     assert np.abs(found.path[:, 1]).max() > 3.4
+
+
+def test_a_bar_turns_where_the_boundary_leaves_room(tmp_path: Path):
+    """Steps are too long to see it leave a ball's edge on its way, and nothing is there that it could touch."""
+    text = "Boundary Sphere2D [0 0; 2]\nMultibodies\n1\nActive\n1\nbar.g Planar Rotational\nConnections\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, text, bar=box_mesh(1, 0.1, 0.1)), engine="mujoco")
+    start, goal = np.array([1.2, 0, 1.6]), np.array([1.2, 0, -1.5])
+    found = plan(scene, start, goal, resolution=5.0, time=20)
+    assert_leads(scene, found, start, goal)
+    rows = np.concatenate([scene.space.interpolate(a, b, 400) for a, b in pairwise(found.path)])
+    # Each corner's distance from the middle, by algebra.
+    corners = np.array([[x, y] for x in (-1, 1) for y in (-0.1, 0.1)])
+    c, s = np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
+    x = rows[:, :1] + c * corners[:, 0] - s * corners[:, 1]
+    y = rows[:, 1:2] + s * corners[:, 0] + c * corners[:, 1]
+    # Looks are 0.1 apart, so that no corner is farther than half of that from where it was seen; straight on, it is 2.2.
+    assert np.hypot(x, y).max() <= 2.05
+
+
+@pytest.mark.parametrize("planner", ["RRTConnect", "BatchEST"])
+def test_a_goal_that_is_whole_turns_away_is_reached_in_its_own_numbers(planner: str, room: Path):
+    scene = env2mjcf.load(room / "open.env", engine="mujoco")
+    start, goal = np.array([-2, 0, -7.0]), np.array([2, 0, 20.0])
+    found = plan(scene, start, goal, planner=planner, time=20)
+    assert_leads(scene, found, start, goal)
 
 
 def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from scenes import MODELS
+from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.contact.exact.motions import Motions
 from env2mjcf.contact.exact.tables import BLOCK, LANES
 from env2mjcf.contact.exact.wide_tree import box_tree, depth, wide_tree
+from env2mjcf.formats.meshes.byu import export_byu
 from env2mjcf.geometry.distance import nearest
 from env2mjcf.geometry.orientation import winding_numbers
 from env2mjcf.transforms import rotation_matrix, transform
@@ -93,6 +95,19 @@ def test_distances_of_triangles_are_those_of_the_library_of_arrays() -> None:
                 continue
             assert np.sqrt(triangle_distance(triangle, row)) == pytest.approx(expected.min(), rel=1e-9)
             assert triangle_gap(triangle, row) <= expected.min() ** 2 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("angle", [1.0, 5e-3, 1e-4, 1e-6])
+def test_edges_that_are_nearly_parallel_are_nearest_where_they_cross(angle: float) -> None:
+    """One edge passes at a height over the middle of another one; what else the triangles have lies farther off."""
+    height = 0.1 * angle
+    a = np.array([[-1, 0, 0], [1, 0, 0], [0.3, 0.2, -1]])
+    c, s = np.cos(angle), np.sin(angle)
+    b = np.array([[-c, -s, height], [c, s, height], [0.1, -0.3, 1 + height]])
+    for first, second in ((a, b), (b, a)):
+        for turn in range(3):
+            row, triangle = block_of(np.tile(np.roll(second, turn, axis=0), (BLOCK, 1, 1))), tuple(first.ravel())
+            assert np.sqrt(triangle_distance(triangle, row)) == pytest.approx(height, rel=1e-6)
 
 
 def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
@@ -221,3 +236,32 @@ def test_rays_count_as_winding_numbers_do() -> None:
     stack = np.zeros(4096, dtype=np.int64)
     assert [holds(tables, shape, *point, stack) for point in points] == expected.tolist()
     assert 200 < expected.sum() < 2800
+
+
+@pytest.mark.parametrize("corners", [5, 7, 9, 12])
+def test_points_of_a_star_are_inside_as_algebra_says(tmp_path: Path, corners: int) -> None:
+    """A prism over a star, which is not convex: leaves of its tree are filled up with a triangle again."""
+    angles = np.pi * np.arange(2 * corners) / corners
+    radii = np.where(np.arange(2 * corners) % 2, 0.5, 1.0)
+    rim = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    n = len(rim)
+    vertices = [[*p, z] for z in (-0.4, 0.4) for p in [*rim, np.zeros(2)]]
+    faces = []
+    for i in range(n):
+        j, top = (i + 1) % n, n + 1
+        faces += [[j, i, n], [top + i, top + j, top + n], [i, j, top + j], [i, top + j, top + i]]
+    star = trimesh.Trimesh(vertices, faces, process=False)
+    path = write_scene(tmp_path, free_cube("star.g 0 0 0 0 0 0"), star=export_byu(star))
+    scene = env2mjcf.load(path)
+    tables = opened(*scene._solver._chosen("exact")._tables)
+    frame, shape = tables.poses[0].reshape(3, 4), int(tables.obstacles[0, 0])
+    points = np.random.default_rng(7).uniform(-1, 1, (400, 3)) * [1.05, 1.05, 0.5]
+    # Between two corners of the rim, a point is inside if it is on the middle's side of the line through them.
+    sector = np.floor(np.mod(np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi) / (np.pi / corners)).astype(int)
+    p, q = rim[sector], rim[(sector + 1) % n]
+    side = np.linalg.det(np.stack([q - p, points[:, :2] - p], axis=1))
+    expected = (side > 0) & (np.abs(points[:, 2]) < 0.4)
+    stack = np.zeros(4096, dtype=np.int64)
+    local = (points - frame[:, 3]) @ frame[:, :3]
+    assert [holds(tables, shape, *point, stack) for point in local] == expected.tolist()
+    assert 80 < expected.sum() < 320
