@@ -40,11 +40,11 @@ def _note(frame: FrameType, event: str, argument: Any) -> None:
 @pytest.hookimpl(hookwrapper=True)
 def pytest_fixture_setup(fixturedef: Any) -> Iterator[None]:
     """Keep apart what a fixture enters, and those that it asks for."""
-    global _entered
-    outer, _entered = _entered, set()
+    outer = set(_entered)
+    _entered.clear()
     yield
-    _of_fixtures[id(fixturedef)] = _entered
-    _entered = outer | _entered
+    _of_fixtures[id(fixturedef)] = set(_entered)
+    _entered.update(outer)
 
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)
@@ -57,9 +57,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     yield
     sys.settrace(None)
     threading.settrace(None)  # type: ignore[arg-type]
-    of_fixtures = [
-        _of_fixtures.get(id(d), set()) for ds in getattr(item, "_fixtureinfo").name2fixturedefs.values() for d in ds
-    ]
+    fixtures: Any = item._fixtureinfo.name2fixturedefs  # type: ignore[attr-defined]
+    of_fixtures = [_of_fixtures.get(id(d), set()) for ds in fixtures.values() for d in ds]
     _of_tests[item.nodeid] = (time.process_time() - start, _entered.union(*of_fixtures))
 
 

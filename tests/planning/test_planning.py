@@ -310,7 +310,7 @@ def test_a_bar_turns_where_the_boundary_leaves_room(tmp_path: Path):
     c, s = np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
     x = rows[:, :1] + c * corners[:, 0] - s * corners[:, 1]
     y = rows[:, 1:2] + s * corners[:, 0] + c * corners[:, 1]
-    # Looks are 0.1 apart, so that no corner is farther than half of that from where it was seen; straight on, it is 2.2.
+    # Looks are 0.1 apart: no corner is farther than half of that from where it was seen. Straight on, it comes to 2.2.
     assert np.hypot(x, y).max() <= 2.05
 
 
