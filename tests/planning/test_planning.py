@@ -314,6 +314,7 @@ def test_a_bar_turns_where_the_boundary_leaves_room(tmp_path: Path):
     assert np.hypot(x, y).max() <= 2.05
 
 
+@pytest.mark.slow_but("RRTConnect")
 @pytest.mark.parametrize("planner", ["RRTConnect", "BatchEST"])
 def test_a_goal_that_is_whole_turns_away_is_reached_in_its_own_numbers(planner: str, room: Path):
     scene = env2mjcf.load(room / "open.env", engine="mujoco")
