@@ -37,9 +37,13 @@ ROOMS = ("formats", "kinematics", "pairs.py", "mjcf", "contact", "planning")
 # Of which tests the functions that they enter are learnt.
 SUITES = ("formats", "kinematics", "test_pairs.py", "mjcf", "contact", "planning", "simulation", "companions",
           "translation", "test_conversion.py", "test_bad_input.py", "test_real_scenes.py")  # fmt: skip
-# Whose slow tests take seconds, and are tried too.
-_SLOW_TOO = "tests/contact/exact/test_exact_kernels.py"
+# Whose slow tests take seconds, and are tried too; as plain Python they are quicker than their compilation.
+_OF_KERNELS = "tests/contact/exact/test_exact_kernels.py"
 _KERNELS = "env2mjcf/contact/exact/kernels/"
+# What all compiled code is made of.
+_COMPILED = (_KERNELS, "env2mjcf/contact/exact/tables.py", "env2mjcf/contact/exact/motions.py")
+# What plain Python raises where compiled code goes on.
+_PLAIN_ONLY = ("ZeroDivisionError", "IndexError", "OverflowError", "RuntimeWarning")
 _ENGINE = "env2mjcf/contact/exact/engine.py:"
 # Seconds of tests, by the time that they took while they were traced.
 _MOST_EXACT, _MOST_FILES = 90.0, 240.0
@@ -134,7 +138,7 @@ def traced(copy: Copy, folder: Path) -> list[Test]:
         kept = folder / "traces" / (name.replace("/", "-") + ".json")
         if not kept.exists():
             status, printed = copy.pytest(
-                ["-m", "" if name == _SLOW_TOO else "not slow", name], 1800, ["tracing"], MUTANTS_TRACE=str(kept)
+                ["-m", "" if name == _OF_KERNELS else "not slow", name], 1800, ["tracing"], MUTANTS_TRACE=str(kept)
             )
             print(f"{name}: {printed.strip().splitlines()[-1] if printed.strip() else status}", flush=True)
             if status not in (0, 5):
@@ -182,14 +186,21 @@ def tried(mutant: Mutant, copy: Copy, tests: list[Test]) -> tuple[str, str]:
     target = copy.root / mutant.module
     original = target.read_text()
     target.write_text(mutant.source)
-    of_kernels = mutant.module.startswith("env2mjcf/contact/exact/") and "engine" not in mutant.module
+    compiled = mutant.module.startswith(_COMPILED)
+    seconds = {t.name: t.seconds for t in tests}
+    plan: list[tuple[list[str], float, dict[str, str]]] = []
+    if compiled:
+        plan.append(([_OF_KERNELS], 2 * _START, {"NUMBA_DISABLE_JIT": "1"}))
+    for stage in chosen(mutant, tests):
+        most = _START + 2 * sum(seconds[n] for n in stage)
+        plan.append((stage, most + _COMPILING * compiled, {"fresh": "1"} if compiled else {}))
     try:
-        for stage in chosen(mutant, tests):
-            most = _START + 2 * sum({t.name: t.seconds for t in tests}[n] for n in stage)
-            most += _COMPILING if of_kernels else 0
-            status, printed = copy.pytest(["-x", "-m", "", *stage], most, **({"fresh": "1"} if of_kernels else {}))
+        for stage, most, variables in plan:
+            status, printed = copy.pytest(["-x", "-m", "", *stage], most, **variables)
             if status < 0:
                 return "killed", "took too long, or crashed"
+            if "NUMBA_DISABLE_JIT" in variables and any(word in printed for word in _PLAIN_ONLY):
+                continue
             if status not in (0, 5):
                 noticed = [x.split(" - ")[0] for x in printed.splitlines() if x.startswith(("FAILED ", "ERROR "))]
                 return "killed", noticed[0].split(" ", 1)[1] if noticed else f"pytest ended with {status}"
