@@ -110,6 +110,15 @@ def test_edges_that_are_nearly_parallel_are_nearest_where_they_cross(angle: floa
             assert np.sqrt(triangle_distance(triangle, row)) == pytest.approx(height, rel=1e-6)
 
 
+def test_a_triangle_without_area_is_as_far_as_its_edges() -> None:
+    """It lies on a line beside a corner of the other one, and its plane is none."""
+    line = np.array([[0, 0, 2.0], [1, 1, 2], [3, 3, 2]])
+    other = np.array([[1, 1, 0], [5, 1, 0], [1, 5, -1.0]])
+    for a, b in ((line, other), (other, line)):
+        row = block_of(np.tile(b, (BLOCK, 1, 1)))
+        assert np.sqrt(triangle_distance(tuple(a.ravel()), row)) == pytest.approx(2.0)
+
+
 def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
     """Against python-fcl, whose box is solid too."""
     fcl = pytest.importorskip("fcl", reason="no python-fcl to compare with")
@@ -179,6 +188,17 @@ def test_trees_hold_every_triangle_once_in_boxes_around_it() -> None:
             assert (low >= center - half - 1e-12).all()
             assert (high <= center + half + 1e-12).all()
         assert depth(tree.child) <= 2 + 2 * np.log(len(triangles)) / np.log(LANES)
+
+
+def test_trees_far_away_hold_their_triangles_too() -> None:
+    """Middles and half sizes of boxes are rounded by as much as the place is."""
+    triangles = np.asarray(trimesh.creation.icosphere(2).triangles) + [1e6, -3e6, 2e6]
+    tree = wide_tree(triangles)
+    for node, lane in np.argwhere(tree.child < 0):
+        corners = triangles[tree.faces[~tree.child[node, lane]]].reshape(-1, 3)
+        center, half = tree.boxes[node, :3, lane], tree.boxes[node, 3:, lane]
+        assert (corners <= center + half).all()
+        assert (corners >= center - half).all()
 
 
 def test_trees_over_equal_boxes_are_not_deep() -> None:
