@@ -24,6 +24,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.contact import executors as remote
 from env2mjcf.contact.tasks import Chunks
+from env2mjcf.contact.threads import thread_count
 
 ROOT = Path(__file__).parents[2]
 
@@ -227,6 +228,13 @@ def test_a_slow_first_chunk_is_forgotten() -> None:
         assert rows is not None
         chunks.took(rows.stop - rows.start, (rows.stop - rows.start) * 1e-6)
     assert rows.stop - rows.start > 100_000
+
+
+def test_many_rows_have_every_core_and_few_have_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert [thread_count(None, 10_000_000), thread_count(None, 1), thread_count(3, 1)] == [7, 1, 3]
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert thread_count(None, 10_000_000) == 1
 
 
 def test_wide_rows_make_small_chunks() -> None:

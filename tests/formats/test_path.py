@@ -166,6 +166,14 @@ def test_bad_input_is_refused_where_it_stands(text: str, code: str, message: str
     assert found.span.line == line
 
 
+def test_poses_are_as_many_as_divide_the_rows() -> None:
+    """A second line that lies: four rows are no poses of three links, with the fixed base, but of two."""
+    found, diagnostics = read(f"{HEAD}20001022\n1\n2\n" + "1 2 3 0 0 0\n" * 4, 9, links=(3, 2))
+    assert found.poses is not None
+    assert found.poses.shape == (2, 2, 6)
+    assert [d.code for d in diagnostics] == ["CFG513"]
+
+
 def test_poses_of_another_robot_are_refused() -> None:
     body = "1 2 3 0 0 0\n" * 4
     assert refused(f"{HEAD}20001022\n4\n1\n{body}", 9, links=(3,)).code == "CFG517"

@@ -112,7 +112,8 @@ def _changes(nodes: list[ast.AST] | list[ast.stmt], function: str) -> Iterator[t
 def _inside(node: ast.AST) -> list[ast.AST]:
     """Return the parts of a node that run: neither annotations nor decorators, nor what is written into text."""
     skipped = {"annotation", "returns", "decorator_list", "bases", "keywords" if isinstance(node, ast.ClassDef) else ""}
-    if isinstance(node, ast.JoinedStr | ast.MatchValue):
+    # How long the parts of a `zip` are is not what a program that works depends on.
+    if isinstance(node, ast.JoinedStr | ast.MatchValue) or (isinstance(node, ast.keyword) and node.arg == "strict"):
         return []
     parts: list[ast.AST] = []
     for name, value in ast.iter_fields(node):

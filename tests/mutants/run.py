@@ -18,6 +18,7 @@ import csv
 import datetime
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -275,7 +276,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no change after so long")
     parser.add_argument("--seed", type=int, default=17)
     parser.add_argument("--most", type=float, default=40.0, help="seconds of tests that are tried, and again of others")
-    parser.add_argument("--only", default="", help="of changes whose names hold this")
+    parser.add_argument("--only", type=re.compile, default=re.compile(""), help="try those of them whose names match")
     parser.add_argument("--again", action="store_true", help="try those again that no test had noticed")
     parser.add_argument("--fresh", action="store_true", help="forget what earlier runs have found")
     parser.add_argument("--list", action="store_true", help="show the sample and what is known of it, run nothing")
@@ -287,9 +288,7 @@ def main() -> int:
         shutil.rmtree(options.folder, ignore_errors=True)
     options.folder.mkdir(parents=True, exist_ok=True)
     everything = _all_mutants()
-    sample = sorted((m for m in everything if options.only in m.name), key=lambda m: m.rank(options.seed))[
-        : options.count
-    ]
+    sample = sorted(everything, key=lambda m: m.rank(options.seed))[: options.count]
     kept = options.folder / "verdicts.jsonl"
     verdicts: dict[str, dict[str, str]] = {}
     for line in kept.read_text().splitlines() if kept.exists() else ():
@@ -299,7 +298,7 @@ def main() -> int:
         tests = traced(copy, options.folder)
         for i, mutant in enumerate(sample):
             known = verdicts.get(mutant.name, {}).get("verdict")
-            if known == "killed" or (known == _SURVIVED and not options.again):
+            if known == "killed" or (known == _SURVIVED and not options.again) or not options.only.search(mutant.name):
                 continue
             if time.monotonic() > end:
                 break

@@ -192,7 +192,7 @@ def test_trees_hold_every_triangle_once_in_boxes_around_it() -> None:
 
 def test_trees_far_away_hold_their_triangles_too() -> None:
     """Middles and half sizes of boxes are rounded by as much as the place is."""
-    triangles = np.asarray(trimesh.creation.icosphere(2).triangles) + [1e6, -3e6, 2e6]
+    triangles = np.asarray(trimesh.creation.icosphere(2).triangles) + np.array([1e6, -3e6, 2e6])
     tree = wide_tree(triangles)
     for node, lane in np.argwhere(tree.child < 0):
         corners = triangles[tree.faces[~tree.child[node, lane]]].reshape(-1, 3)
