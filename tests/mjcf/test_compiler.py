@@ -259,9 +259,9 @@ def test_an_sma_joint_reads_and_does_not_convert(tmp_path: Path) -> None:
 
 
 def test_what_is_mujocos_default_is_left_out(tmp_path: Path) -> None:
-    scene = env2mjcf.load(write_scene(tmp_path, free_cube("5 0 0 0 0 0")))
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube()))
     bodies = etree.fromstring(scene.compiled.document.xml.encode()).findall("worldbody/body")
-    assert [dict(b.attrib) for b in bodies] == [{"name": "cube"}, {"name": "cube_2", "pos": "5 0 0"}]
+    assert [dict(b.attrib) for b in bodies] == [{"name": "cube"}]
 
 
 def test_a_joint_that_its_limits_hold_gets_the_least_play(tmp_path: Path) -> None:
