@@ -417,6 +417,15 @@ def test_fewer_links_than_none_are_refused(problem: Reader, name: str) -> None:
     assert (found.code, found.span and found.span.text[found.span.column - 1 :][:2]) == ("ENV110", "-5")
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"), [("true", True), ("TRUE", True), (" 1 ", True), ("False", False), ("0", False), ("yes", None)]
+)
+def test_flags_are_words_or_digits(problem: Reader, word: str, meant: bool | None) -> None:
+    scene = problem(PROBLEM.replace('ignoreSelfCollision="false"', f'ignoreSelfCollision="{word}"'))
+    assert scene.planner_rules.ignore_self_collision is meant
+    assert ("ENV213" in codes(scene)) is (meant is None)
+
+
 def test_leading_zeros_do_not_make_a_number_large(problem: Reader) -> None:
     scene = problem(PROBLEM.replace('ignoreAdjacentLinks="true"', f'ignoreIAdjacentLinks="{"0" * 5000}2"'))
     assert scene.planner_rules.adjacent_links == 2
