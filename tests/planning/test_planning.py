@@ -22,12 +22,12 @@ from env2mjcf.cli.main import main
 
 pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
-from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
+from env2mjcf.planning import PLANNERS, Plan, plan, plan_through, result
 from env2mjcf.planning import planner_space as validity
 from env2mjcf.planning.ompl_bridge import state_space
 from env2mjcf.planning.planner_space import PlanningSpace, Validity
 from env2mjcf.planning.planners import checked_planner
-from env2mjcf.planning.result import Progress
+from env2mjcf.planning.result import Progress, Timekeeper
 from env2mjcf.planning.segment import shortened
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -321,6 +321,18 @@ def test_a_goal_that_is_whole_turns_away_is_reached_in_its_own_numbers(planner: 
     start, goal = np.array([-2, 0, -7.0]), np.array([2, 0, 20.0])
     found = plan(scene, start, goal, planner=planner, time=20, shorten=False)
     assert_leads(scene, found, start, goal)
+
+
+def test_parts_of_the_time_end_when_they_should(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(result.time, "perf_counter", lambda: now[0])
+    watch = Timekeeper(10.0, 1, None)
+    part, longer = watch.stop_within(3.0), watch.stop_within(30.0)
+    for seconds, expected in ((0.0, [False, False, False]), (2.9, [False, False, False]), (3.1, [False, True, False]),
+                              (9.9, [False, True, False]), (10.1, [True, True, True])):  # fmt: skip
+        now[0] = 100.0 + seconds
+        assert [watch.stop(), part(), longer()] == expected
+        assert watch.left == pytest.approx(10.0 - seconds)
 
 
 def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):
