@@ -219,6 +219,14 @@ def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:
     assert scene.model.opt.timestep == 1e-3
 
 
+def test_targets_keep_the_limits_of_joints_that_have_any(tmp_path: Path) -> None:
+    later = env2mjcf.load(write_chain(tmp_path, 2), actuators="position").model
+    assert later.actuator_ctrllimited.tolist() == [1, 1]
+    np.testing.assert_allclose(later.actuator_ctrlrange, [[-math.pi, math.pi]] * 2)
+    turning = env2mjcf.load(MODELS / "seed/seed.env", actuators="position").model
+    assert not turning.actuator_ctrllimited.any()
+
+
 def test_no_drive_is_quicker_than_steps_can_follow(tmp_path: Path) -> None:
     """A critically damped mass swings with w = sqrt(k / m) and is damped by 2 k / w; w is at most 4 a step."""
     scene = env2mjcf.load(write_chain(tmp_path, 1))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import csv
 import datetime
+import hashlib
 import json
 import os
 import re
@@ -124,7 +125,7 @@ class Copy:
 
 
 def traced(copy: Copy, folder: Path) -> list[Test]:
-    """Return all tests and what they enter; files that were traced before are not run again."""
+    """Return all tests and what they enter; files that are as they were traced before are not run again."""
     (folder / "traces").mkdir(exist_ok=True)
     files = [
         path
@@ -136,7 +137,8 @@ def traced(copy: Copy, folder: Path) -> list[Test]:
     tests: list[Test] = []
     for file in files:
         name = str(file.relative_to(ROOT))
-        kept = folder / "traces" / (name.replace("/", "-") + ".json")
+        digest = hashlib.sha256(file.read_bytes()).hexdigest()[:8]
+        kept = folder / "traces" / f"{name.replace('/', '-')}-{digest}.json"
         if not kept.exists():
             status, printed = copy.pytest(
                 ["-m", "" if name == _OF_KERNELS else "not slow", name], 1800, ["tracing"], MUTANTS_TRACE=str(kept)

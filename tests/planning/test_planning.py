@@ -323,6 +323,13 @@ def test_a_goal_that_is_whole_turns_away_is_reached_in_its_own_numbers(planner: 
     assert_leads(scene, found, start, goal)
 
 
+def test_angles_of_circles_are_brought_within_half_a_turn(maze: env2mjcf.Scene):
+    space, angles = space_of(maze), np.array([0.1, -0.1, 3.0, -3.0])
+    for turns in (-2, 0, 1):
+        rows = np.column_stack([np.zeros((4, 2)), angles + 2 * np.pi * turns])
+        np.testing.assert_allclose(space.enforced(rows)[:, 2], angles, atol=1e-12)
+
+
 def test_parts_of_the_time_end_when_they_should(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
     monkeypatch.setattr(result.time, "perf_counter", lambda: now[0])
