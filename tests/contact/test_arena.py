@@ -17,6 +17,7 @@ from truth import Truth
 
 import env2mjcf
 from env2mjcf.cli.main import main
+from env2mjcf.contact.arena import lack
 from env2mjcf.contact.mujoco_engine import MujocoEngine
 from env2mjcf.mjcf import scenery
 from env2mjcf.simulation import loading
@@ -290,6 +291,26 @@ class TestDensePairs:
         text = free_cube("notched.g 3 0 0 0 0 0", "0 3 0 0 0 0")
         scene = env2mjcf.load(write_scene(folder, text, notched=notched_block()), engine="mujoco")
         assert not [d for d in scene.diagnostics if d.code == "MJC419"]
+
+
+@pytest.mark.parametrize(
+    ("memory", "said", "warned"),
+    [
+        ("20K", "out of memory", True),
+        ("100K", r"its memory of 0\.0977 MB is full after \d+ contacts", True),
+        ("200K", r"its memory of 0\.195 MB has no room for the forces of 190 contacts", True),
+        ("2000K", "^$", False),
+    ],
+)
+def test_what_memory_lacks_is_said_and_counted(memory: str, said: str, warned: bool) -> None:
+    """Twenty balls in one place: each of 190 pairs has a contact, and four forces."""
+    balls = '<body><freejoint/><geom size="1"/></body>' * 20
+    text = f'<mujoco><size memory="{memory}"/><worldbody>{balls}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    assert re.search(said, lack(mujoco.mj_forward, model, data))
+    assert bool(data.warning.number.any()) is warned
+    assert warned or (data.ncon, data.nefc) == (190, 760)
 
 
 class TestEightBottles:

@@ -15,8 +15,9 @@ from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf import Scene
+from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.errors import FormatError
-from env2mjcf.mjcf.actuators import mass_matrix
+from env2mjcf.mjcf.actuators import drives, mass_matrix
 from env2mjcf.options import Actuators
 
 JOINTED = ("gantry/gantry.env", "seed/seed.env", "spherical-arm/spherical-arm.env", "xml-arm/xml-arm.xml",
@@ -337,6 +338,26 @@ def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:
     thickness = 9.81 * (70 * 1.58e-3) ** 2 / 2
     scene = env2mjcf.load(write_chain(tmp_path, 1, 2.0, thickness))
     assert scene.model.opt.timestep == 1e-3
+
+
+def test_targets_keep_the_limits_of_joints_that_have_any(tmp_path: Path) -> None:
+    later = env2mjcf.load(write_chain(tmp_path, 2), actuators="position").model
+    assert later.actuator_ctrllimited.tolist() == [1, 1]
+    np.testing.assert_allclose(later.actuator_ctrlrange, [[-math.pi, math.pi]] * 2)
+    turning = env2mjcf.load(MODELS / "seed/seed.env", actuators="position").model
+    assert not turning.actuator_ctrllimited.any()
+
+
+def test_no_drive_is_quicker_than_steps_can_follow(tmp_path: Path) -> None:
+    """A critically damped mass swings with w = sqrt(k / m) and is damped by 2 k / w; w is at most 4 a step."""
+    scene = env2mjcf.load(write_chain(tmp_path, 1))
+    data, mass = mujoco.MjData(scene.model), np.zeros((1, 1))
+    mujoco.mj_forward(scene.model, data)
+    mujoco.mj_fullM(scene.model, data, mass)
+    assembly, step = scene.compiled.assembly, 10.0
+    (drive,) = drives(assembly.robots, scene.space, [scene.space.home], 0.0, step, DiagnosticLog()).values()
+    assert drive.stiffness == pytest.approx(mass[0, 0] * (4 / step) ** 2, rel=1e-2)
+    assert drive.damping == pytest.approx(drive.stiffness * step / 2, rel=1e-2)
 
 
 def test_a_ground_beside_gravity_is_reported(tmp_path: Path) -> None:
