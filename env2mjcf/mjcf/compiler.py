@@ -18,6 +18,7 @@ from ..pairs import PairTable
 from ..system.imports import installed_version
 from ..transforms import Array
 from .actuators import Drive, add_actuators, add_sensors, drives
+from .dense_contacts import report_contacts
 from .geoms import add_contacts, excluded_obstacles
 from .links import Compilation, add_obstacles, add_robot
 from .loops import CLOSED, add_loops
@@ -28,7 +29,7 @@ from .scenery import (
     add_settings,
     add_sky,
     gravity_of_file,
-    report_contacts,
+    integrator,
     time_step,
     wall_speed,
 )
@@ -86,7 +87,7 @@ def compile_mjcf(
     if options.sensors:
         add_sensors(root, space)
     _report_unused(assembly, options, log)
-    report_contacts(assembly, pairs, step, damped=bool(damped), log=log)
+    report_contacts(assembly, pairs, step, 4 if integrator(assembly, damped=bool(damped)) == "RK4" else 1, log)
     _add_keyframes(root, space, keys, driven if options.actuators == "position" else {})
     text = to_text(root)
     return Document(

@@ -19,7 +19,7 @@ import env2mjcf
 from env2mjcf.cli.main import main
 from env2mjcf.contact.arena import lack
 from env2mjcf.contact.mujoco_engine import MujocoEngine
-from env2mjcf.mjcf import scenery
+from env2mjcf.mjcf import dense_contacts, scenery
 from env2mjcf.simulation import loading
 
 # The half section of a closed bottle with walls, radius and height, from the middle of its foot to that of its floor.
@@ -205,7 +205,7 @@ class TestMemory:
             assert min(cells) > 1
             # 8 contacts of two cells, at most, and 40 of each cell with the other body.
             expected = min(8 * cells[0] * cells[1], 40 * max(cells))
-            assert scenery.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
+            assert dense_contacts.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
 
     @pytest.mark.parametrize("sides", [8, pytest.param(48, marks=pytest.mark.slow)])
     def test_what_is_written_steps_in_plain_mujoco(self, folder: Path, sides: int) -> None:
@@ -219,7 +219,7 @@ class TestMemory:
         assert not list(folder.rglob("MUJOCO_LOG.TXT"))
 
     def test_no_more_is_asked_for_than_is_sane(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(scenery, "MOST_MEMORY", 20 << 20)
+        monkeypatch.setattr(dense_contacts, "MOST_MEMORY", 20 << 20)
         scene = env2mjcf.load(write_scene(folder, star(80)), engine="mujoco")
         assert re.findall(r'<size memory="(.*)"/>', scene.xml) == ["20M"]
         said = [d for d in scene.diagnostics if d.code == "MJC405"]
@@ -250,9 +250,9 @@ class TestMemory:
         compiled = scene.compiled
         data = mujoco.MjData(scene.model)
         mujoco.mj_forward(scene.model, data)
-        possible = int(scenery.possible_contacts(compiled.assembly, compiled.pairs).sum())
+        possible = int(dense_contacts.possible_contacts(compiled.assembly, compiled.pairs).sum())
         assert 0.5 * possible <= data.ncon <= possible
-        needed = scenery.contact_memory(compiled.assembly, compiled.pairs)
+        needed = dense_contacts.contact_memory(compiled.assembly, compiled.pairs)
         assert 0.3 * needed <= data.maxuse_arena + data.maxuse_stack <= needed
 
     @pytest.mark.parametrize("robots", [8, pytest.param(32, marks=pytest.mark.slow)])
