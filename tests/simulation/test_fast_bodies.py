@@ -10,7 +10,7 @@ import pytest
 import trimesh
 from meshes import table, voxels
 from scenes import write_scene
-from test_sliding import notched_box, sliding
+from slides import Slide, notched_box
 
 import env2mjcf
 from env2mjcf import Scene
@@ -105,10 +105,8 @@ def test_speculative_contacts_hold_what_is_faster(tmp_path: Path) -> None:
 
 
 def test_speculative_contacts_stay_off_because_they_catch_what_slides(tmp_path: Path) -> None:
-    speeds = []
-    for flag in (0, SPECULATIVE):
-        velocity = sliding(tmp_path, notched_box(), 0.8, 10.0, seconds=0.1, flags=flag)
-        speeds.append(velocity[0])
+    slide = Slide("frictionless", "notched", 0.0, 0.8, 10.0)
+    speeds = [slide.run("plate", seconds=0.1, flags=flag)[1][0] for flag in (0, SPECULATIVE)]
     assert speeds[0] == pytest.approx(10.0, rel=1e-3)
     assert speeds[1] < 9.0
     assert not before_a_wall(tmp_path, "die", "board").model.opt.enableflags & SPECULATIVE
