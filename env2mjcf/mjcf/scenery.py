@@ -177,9 +177,7 @@ def add_scenery(world: Element, assembly: Assembly, options: Options, lowest: fl
         # Slightly below the lowest point, so that nothing starts in contact with it.
         pos = numbers((center[0], center[1], lowest - 1e-3 * extent))
         size = numbers((extent, extent, extent / 20))
-        # What is wedged between it and an obstacle gives way on the other side: stiffer than all else.
-        stiff = {"priority": "1", "solimp": "0.999 0.9999 0.001"}
-        add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size, **stiff)
+        add(world, "geom", name="ground", type="plane", material="ground", pos=pos, size=size)
     boundary = assembly.boundary
     if boundary is not None and options.boundary == "visual":
         add_wires(world, boundary, assembly)

@@ -106,14 +106,7 @@ def scene_of(name: str, noise: float, over: str = "plate", step: float = 0.0) ->
     text += f"{1 if over == 'plane' else 2}\n\n{_robot('slider')}{under}"
     with tempfile.TemporaryDirectory() as folder:
         file = write_scene(Path(folder), text, slider=export_byu(slider), plate=export_byu(flat))
-        scene = env2mjcf.load(file, ground=over == "plane")
-    if over == "plane":
-        # As any other geom.
-        model, last = scene.model, scene.model.ngeom - 1
-        ground = int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0])
-        model.geom_priority[ground] = model.geom_priority[last]
-        model.geom_solimp[ground], model.geom_solref[ground] = model.geom_solimp[last], model.geom_solref[last]
-    return scene
+        return env2mjcf.load(file, ground=over == "plane")
 
 
 @dataclass(frozen=True)
