@@ -27,6 +27,14 @@ MODELS = Path(__file__).parents[1] / "models"
 ROLLOUTS, STEPS, COMPARED = 64, 200, 500
 PATIENCE = 120  # seconds
 
+LEGEND = """
+Made by `python benchmarks/rollouts.py --other PYTHON`. {rollouts} simulations of {steps} steps from the scene's first
+keyframe, with speeds at random: one after the other by `mj_step` from Python, and by `mujoco.rollout` with one thread
+and with {cores}. Warp: by how much any number of qpos differs from MuJoCo's after {compared} steps from the first
+keyframe, on Warp's CPU device, in single precision. MJX: seconds until the first step is compiled, on the CPU, {patience}
+at the most; with `collision="hull"`, and as written.
+""".strip()
+
 # Runs in the other Python; prints what it found, null where the scene is refused or takes too long.
 WARP = """
 import json, sys, time
@@ -65,11 +73,7 @@ def main() -> None:
     lines = [
         "# Thousands at once, measured",
         "",
-        f"Made by `python benchmarks/rollouts.py`. {ROLLOUTS} simulations of {STEPS} steps from the scene's first keyframe, "
-        f"with speeds at random; one after the other by `mj_step` from Python, and by `mujoco.rollout` with one thread and with "
-        f"{os.cpu_count()}. Warp: the largest difference of any number of qpos from MuJoCo's after {COMPARED} steps from the "
-        f"first keyframe, on Warp's CPU device, in single precision. MJX: seconds until the first step is compiled, on the CPU, at most "
-        f'{PATIENCE}; with `collision="hull"` and as written.',
+        LEGEND.format(rollouts=ROLLOUTS, steps=STEPS, cores=os.cpu_count(), compared=COMPARED, patience=PATIENCE),
         "",
         *table(
             (

@@ -7,9 +7,8 @@ From top to bottom, in the current folder, where what they write stays:
   stands what it prints. A command that is to fail is written with `|| echo ...`.
 * ```` ```{code-block} LANGUAGE ```` with a `:caption:`: written into the file that the caption names.
 
-`...` stands for anything. ```` ```sh ```` and code blocks without caption are not run, nor is Python that needs more than
-the extras: a comment before them says why,
-`<!-- not run: reason -->`.
+`...` stands for anything. ```` ```sh ```` and code blocks without caption are not run, nor is Python that needs
+more than the extras: a comment before them says why, `<!-- not run: reason -->`.
 """
 
 from __future__ import annotations
