@@ -31,8 +31,8 @@ LEGEND = """
 Made by `python benchmarks/rollouts.py --other PYTHON`. {rollouts} simulations of {steps} steps from the scene's first
 keyframe, with speeds at random: one after the other by `mj_step` from Python, and by `mujoco.rollout` with one thread
 and with {cores}. Warp: by how much any number of qpos differs from MuJoCo's after {compared} steps from the first
-keyframe, on Warp's CPU device, in single precision. MJX: seconds until the first step is compiled, on the CPU, {patience}
-at the most; with `collision="hull"`, and as written.
+keyframe, on Warp's CPU device, in single precision. MJX: seconds until the first step is compiled, on the CPU,
+{patience} at the most; with `collision="hull"`, and as written.
 """.strip()
 
 # Runs in the other Python; prints what it found, null where the scene is refused or takes too long.
