@@ -25,7 +25,7 @@ import env2mjcf
 
 MODELS = Path(__file__).parents[1] / "models"
 ROLLOUTS, STEPS, COMPARED = 64, 200, 500
-PATIENCE = 120  # seconds
+PATIENCE = 20  # seconds
 
 LEGEND = """
 Made by `python benchmarks/rollouts.py --other PYTHON`. {rollouts} simulations of {steps} steps from the scene's first
