@@ -227,6 +227,7 @@ CATALOGUE: dict[str, str] = {
     "MJC416": "Boxes were to be written as box geoms, and no body collides as a box.",
     "MJC417": "Of the joints of closed loops as many are driven as can move independently.",
     "MJC418": "Gravity does not pull bodies to the ground.",
+    "MJC419": "Bodies of many convex pieces can have so many contacts that MuJoCo is slow, or its memory too small.",
     "MJC420": "The output folder may not be written.",
     "MJC421": "A file stands where the output folder should be.",
     "MJC422": "The output cannot be written.",

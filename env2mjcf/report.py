@@ -52,6 +52,8 @@ class Report:
         meshes: One entry for each mesh.
         diagnostics: Number of diagnostics by severity.
         origin: Where the MJCF's origin lies in the file's frame, metres.
+        wall_speed: Speed, m/s, up to which walls hold what moves in MuJoCo, at the time step of the MJCF; None where
+            nothing can touch.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Report:
     meshes: tuple[MeshReport, ...] = field(repr=False)
     diagnostics: dict[str, int]
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wall_speed: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values, for JSON."""
@@ -119,4 +122,5 @@ def report(compiled: Compiled) -> Report:
         meshes=tuple(meshes.values()),
         diagnostics=counts,
         origin=assembly.origin,
+        wall_speed=compiled.document.wall_speed,
     )

@@ -93,6 +93,13 @@ def test_a_weld_does_not_hide_a_pair(tmp_path: Path) -> None:
     assert touching(scene) == pairs(scene)
 
 
+def test_mujoco_is_told_of_pairs_that_move_alone(tmp_path: Path) -> None:
+    """Bodies that are welded to each other MuJoCo never tests, so that nothing need be said of them."""
+    scene = env2mjcf.load(arm(tmp_path, second="NonActuated"), collision="hull")
+    assert {frozenset((p.link, p.other)) for p in scene.compiled.pairs.excluded} == named("base-a", "b-c")
+    assert scene.model.nexclude == 2
+
+
 def test_welded_links_two_steps_apart_are_a_constant_pair(tmp_path: Path) -> None:
     text = ARM.replace("2 3 Revolute -1:1", "2 3 NonActuated").format(
         second="NonActuated", extra="", pose="5 0 0 0 0 0"

@@ -116,3 +116,7 @@ def test_wrapping_changes_an_angle_by_whole_turns(angle: float) -> None:
 def test_an_angle_that_needs_no_wrapping_keeps_every_digit() -> None:
     assert float(wrap(0.1)) == 0.1
     assert float(wrap(-math.pi)) == -math.pi
+
+
+def test_half_a_turn_has_one_name() -> None:
+    assert [float(a) for a in wrap([math.pi, -math.pi, 3 * math.pi])] == [-math.pi] * 3

@@ -82,12 +82,17 @@ def geometry_part(report: Report, every: bool) -> Iterator[RenderableType]:
             ("geoms", f"{report.geoms} that collide"),
             ("pairs", f"{report.pairs} tested"),
             ("certain", f"beyond {report.band:.2g} m of contact"),
+            *_walls(report.wall_speed),
         ]
     )
 
 
 def _origin(origin: tuple[float, float, float]) -> list[tuple[str, str]]:
     return [("origin", f"of the MJCF: {' '.join(map(short, origin))} m in the file's frame")] if any(origin) else []
+
+
+def _walls(speed: float | None) -> list[tuple[str, str]]:
+    return [] if speed is None else [("walls", f"hold what is no faster than {speed:g} m/s in MuJoCo")]
 
 
 def pairs_part(counts: Sequence[PairCount], samples: int) -> Iterator[RenderableType]:

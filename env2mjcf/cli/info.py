@@ -79,7 +79,7 @@ class Info:
         facts: dict[str, Any] = plain(summary)
         if scene is not None:
             report = dataclasses.asdict(scene.report)
-            facts |= {k: report[k] for k in ("collision", "geoms", "mass", "extent", "meshes")}
+            facts |= {k: report[k] for k in ("collision", "geoms", "mass", "extent", "meshes", "wall_speed")}
             facts["pairs"] = scene.pairs if self.pairs else len(scene.pairs)
             if self.pairs:
                 counts = self._counts(scene)

@@ -1,7 +1,8 @@
-"""Merge adjacent coplanar triangles into convex polygons."""
+"""Merge adjacent triangles that lie in one plane, to within a tolerance, into convex polygons."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from .topology import Edges, Floats, Ints, area_vectors, edges
 
 PARALLEL = 1.0 - 1e-12
 """Cosine of the angle from which on two normals are one."""
+
+# Cosine of the angle (5 degrees) from which on MuJoCo takes two faces for one when it looks where they touch.
+_SMOOTH = 0.996
 
 # How far reflex a corner may be, in units of the tolerance: rounding only, since many in a row add up.
 _STRAIGHT = 1e-3
@@ -23,7 +27,7 @@ class Polygon:
 
     Attributes:
         loop: Vertex indices, counter-clockwise from outside; three in a row may be collinear.
-        normal: (3,) unit normal.
+        normal: (3,) unit normal of the plane that the corners are near, by area.
         faces: Indices of the triangles that it covers.
     """
 
@@ -41,7 +45,7 @@ def convex_polygons(vertices: Floats, faces: Ints, tolerance: float, table: Edge
     Args:
         vertices: (n, 3).
         faces: (m, 3) without degenerate ones.
-        tolerance: Length by which a merged vertex may be off the plane.
+        tolerance: Length by which a corner may be off the polygon's plane through the mean of all.
         table: `edges(faces)`, where it is known.
 
     Returns:
@@ -56,10 +60,28 @@ def convex_polygons(vertices: Floats, faces: Ints, tolerance: float, table: Edge
     return merger.polygons()
 
 
+def bend(vertices: Floats, polygons: Sequence[Polygon]) -> float:
+    """Return how far a corner of any polygon is off its plane, at most."""
+    most = 0.0
+    for polygon in polygons:
+        if len(polygon.loop) > 3:
+            heights = vertices[list(polygon.loop)] @ polygon.normal
+            most = max(most, float(np.abs(heights - heights.mean()).max()))
+    return most
+
+
 def flat_neighbours(
-    vertices: Floats, faces: Ints, table: Edges, normals: Floats, tolerance: float
+    vertices: Floats, faces: Ints, table: Edges, normals: Floats, tolerance: float, parallel: float = PARALLEL
 ) -> tuple[Ints, Ints, Ints, Floats]:
     """Find the faces that lie in one plane with a neighbour, at an edge that only the two have and walk both ways.
+
+    Args:
+        vertices: (n, 3).
+        faces: (m, 3).
+        table: `edges(faces)`.
+        normals: (m, 3) unit normals.
+        tolerance: Length by which a corner may be off the neighbour's plane.
+        parallel: Cosine of the angle from which on two normals may be of one plane.
 
     Returns:
         The corners of the two faces from which the edge leads, the edge, and the cosine of their normals, (p,) each.
@@ -71,7 +93,7 @@ def flat_neighbours(
     cosine = np.einsum("ij,ij->i", normals[left], normals[right])
     apart = vertices[faces[right, (there + 2) % 3]] - vertices[faces[left, here % 3]]
     level = np.abs(np.einsum("ij,ij->i", normals[left], apart)) <= tolerance
-    flat = (np.abs(cosine) > PARALLEL) & level
+    flat = (np.abs(cosine) > parallel) & level
     return here[flat], there[flat], edge[flat], cosine[flat]
 
 
@@ -80,12 +102,13 @@ def _candidates(
 ) -> list[tuple[int, int, int, int]]:
     """Return (left face, right face, a, b) of edges a-b between coplanar faces, the longest first."""
     normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    here, there, edge, cosine = flat_neighbours(vertices, faces, table, normals, tolerance)
+    here, there, edge, cosine = flat_neighbours(vertices, faces, table, normals, 2 * tolerance, _SMOOTH)
     here, there, edge = here[cosine > 0], there[cosine > 0], edge[cosine > 0]
     left, right = here // 3, there // 3
     a, b = faces[left, here % 3], faces[left, (here + 1) % 3]
     length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    order = np.lexsort((edge, -length))
+    # Lengths that differ by no more than the tolerance are one, so that noise does not decide the order.
+    order = np.lexsort((edge, -np.round(length / max(tolerance, np.finfo(np.float64).tiny))))
     return np.column_stack([left, right, a, b])[order].tolist()
 
 
@@ -93,6 +116,7 @@ class _Merger:
     """The polygons so far; each is known by one of its triangles (union-find)."""
 
     def __init__(self, vertices: Floats, faces: Ints, areas: Floats, tolerance: float) -> None:
+        self._vertices = vertices
         self._points: list[list[float]] = vertices.tolist()
         self._areas: list[list[float]] = areas.tolist()
         self._loops: list[list[int]] = faces.tolist()
@@ -110,20 +134,21 @@ class _Merger:
         if joined is None:
             return
         loop, seam = joined
-        big, small = sorted((left, right), key=lambda f: -_dot(self._areas[f], self._areas[f]))
-        normal = self._areas[big]
-        size = _dot(normal, normal) ** 0.5
-        normal = [x / size for x in normal]
-        # Neighbours are coplanar in pairs; many pairs in a row may still bend away from a plane.
-        origin = self._points[self._loops[big][0]]
-        if any(abs(_dot(normal, _minus(self._points[v], origin))) > self._tolerance for v in self._loops[small]):
+        area = [x + y for x, y in zip(self._areas[left], self._areas[right], strict=True)]
+        size = _dot(area, area) ** 0.5
+        if size == 0.0:
             return
+        normal = [x / size for x in area]
         if not (self._is_corner(loop, 0, normal) and self._is_corner(loop, seam, normal)):
+            return
+        # Neighbours are coplanar in pairs; many pairs in a row may still bend away from a plane.
+        heights = self._vertices[loop] @ np.array(normal)
+        if np.abs(heights - heights.mean()).max() > self._tolerance:
             return
         first, second = min(left, right), max(left, right)
         self._parent[second] = first
         self._loops[first] = loop
-        self._areas[first] = [x + y for x, y in zip(self._areas[left], self._areas[right], strict=True)]
+        self._areas[first] = area
 
     def polygons(self) -> tuple[Polygon, ...]:
         members: dict[int, list[int]] = {}

@@ -26,7 +26,17 @@ LEAST_WIDTH = 1e-7
 LEAST_AREA = 2e-14
 """Least area of a mesh in square metres that MuJoCo takes, with room for rounding."""
 
+# How far a corner of a polygon may be off its plane, in units of the thickness, and of the diagonal at most. A cell
+# is off by as much at its top, at its sides, which follow the neighbours, and where it grazes others: together less
+# than half of the thickness.
+_FLAT_PER_THICKNESS, _FLATTEST = 0.1, 1e-6
+
 _BLOCK = 2_000_000  # distances from corners to edges that are computed at once
+
+
+def flatness(diagonal: float, thickness: float) -> float:
+    """Return by how much a corner of a polygon may be off its plane, for a mesh and the thickness of its prisms."""
+    return min(_FLAT_PER_THICKNESS * thickness, _FLATTEST * diagonal)
 
 
 def hull_volume(points: Floats) -> float:
@@ -143,7 +153,7 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
         corners = vertices[np.array([loops[i] for i in members])]  # (g, k, 3)
         normals = np.array([polygons[i].normal for i in members])
         centers = corners.mean(axis=1)
-        local = corners - centers[:, None]
+        local = flattened(corners - centers[:, None], normals)
         shift = normals[:, None] * np.array([below, above])[None, :, None]  # (g, 2, 3)
         points = (local[:, None] + shift[:, :, None]).reshape(len(members), -1, 3)
         points.setflags(write=False)
@@ -158,6 +168,11 @@ def prisms(vertices: Floats, polygons: Sequence[Polygon], thickness: float, inwa
             elif surfaces[row] >= LEAST_AREA:
                 out[i] = ConvexPiece(points[row], centers[row], polygons[i])
     return tuple(piece for piece in out if piece is not None)
+
+
+def flattened(local: Floats, normals: Floats) -> Floats:
+    """Return corners (g, k, 3) about their means, moved into planes through those with unit normals (g, 3)."""
+    return local - np.einsum("gkj,gj->gk", local, normals)[:, :, None] * normals[:, None]
 
 
 def corner_loops(vertices: Floats, polygons: Sequence[Polygon]) -> list[tuple[int, ...]]:

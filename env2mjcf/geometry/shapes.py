@@ -17,7 +17,7 @@ from .convexity import Box, exact_box, is_convex
 from .coplanar import Polygon, convex_polygons
 from .decompose import DecompositionError, approximate_parts
 from .mesh import Mesh
-from .pieces import LEAST_AREA, ConvexPiece, hull_piece, hull_volume, prisms
+from .pieces import LEAST_AREA, ConvexPiece, flatness, hull_piece, hull_volume, prisms
 from .shells import Shells, shells
 from .store import GeometryCache
 from .topology import RELATIVE_TOLERANCE, Bools, Ints, by_component, face_areas
@@ -26,7 +26,7 @@ CONCAVE_PER_THICKNESS = 0.2
 """How far a point of a convex surface may lie inside its hull, in units of the thickness: a tenth of the band in which
 verdicts may differ from the triangles, which is two thicknesses wide."""
 
-# Triangles above which reading a file is quicker than computing its content.
+# Triangles above which reading a file is quicker than computing its content, which for cells it always is.
 _WORTH_KEEPING = 200
 
 
@@ -97,7 +97,8 @@ def collision_shape(
     subject = subject or mesh.name
     build = partial(_STRATEGIES[strategy], mesh, analysis, thickness, work or Work())
     try:
-        if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or (strategy == "coacd" and not analysis.convex)):
+        slow = not analysis.convex and not analysis.flat and strategy in ("auto", "solid", "coacd")
+        if cache is not None and (len(mesh.faces) > _WORTH_KEEPING or slow):
             what, known = ("shape", mesh.digest, strategy, thickness), {"mesh": mesh, "analysis": analysis}
             kinds = CollisionShape, ConvexPiece, Polygon, Box
             shape = cache.remember(what, build, kinds=kinds, known=known, log=log, subject=subject)
@@ -163,7 +164,8 @@ def _prisms(
     omitted: list[tuple[float, float]] = []
     for inward in (True, False):
         rows = np.flatnonzero((chosen & (analysis.solids == inward))[analysis.component])
-        polygons = convex_polygons(analysis.vertices, analysis.faces[rows], analysis.tolerance)
+        flat = max(analysis.tolerance, flatness(analysis.diagonal, thickness))
+        polygons = convex_polygons(analysis.vertices, analysis.faces[rows], flat)
         made = prisms(analysis.vertices, polygons, thickness, inward=inward)
         kept = {id(piece.polygon) for piece in made}
         omitted.append(_omitted(analysis, rows, [p for p in polygons if id(p) not in kept]))

@@ -15,7 +15,7 @@ from ..geometry.mesh import Mesh
 from ..geometry.shapes import CollisionShape
 from ..model.names import file_stem, mesh_stem, unique
 from ..transforms import Array
-from .markup import ASSET_FOLDER, Element, add, numbers, to_text
+from .markup import ASSET_FOLDER, Element, add, to_text
 
 # More faces than this in an STL file is an error of MuJoCo's loader.
 _MAX_STL_FACES = 200_000
@@ -106,5 +106,7 @@ def _drawable(mesh: Mesh) -> tuple[Array, np.ndarray]:
 def _cell_file(name: str, shape: CollisionShape) -> bytes:
     root = etree.Element("mujocoinclude")
     for i, piece in enumerate(shape.pieces):
-        add(root, "mesh", name=f"{name}:{i}", vertex=numbers(piece.vertices))
+        # MuJoCo keeps them as float32, which nine digits tell apart.
+        corners = (piece.vertices.astype(np.float32) + 0.0).ravel().tolist()
+        add(root, "mesh", name=f"{name}:{i}", vertex=" ".join(["%.9g"] * len(corners)) % tuple(corners))
     return to_text(root).encode("ascii", "xmlcharrefreplace")

@@ -18,11 +18,21 @@ from ..pairs import PairTable
 from ..system.imports import installed_version
 from ..transforms import Array
 from .actuators import Drive, add_actuators, add_sensors, drives
+from .dense_contacts import report_contacts
 from .geoms import add_contacts, excluded_obstacles
 from .links import Compilation, add_obstacles, add_robot
 from .loops import CLOSED, add_loops
 from .markup import Element, add, comment_text, number, numbers, plain, to_text
-from .scenery import add_ground_material, add_scenery, add_settings, add_sky, gravity_of_file, time_step
+from .scenery import (
+    add_ground_material,
+    add_scenery,
+    add_settings,
+    add_sky,
+    gravity_of_file,
+    integrator,
+    time_step,
+    wall_speed,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +44,14 @@ class Document:
         xml: The MJCF text.
         assets: Contents of the files it refers to, by path relative to it.
         owners: Name of the body that each collision geom belongs to.
+        wall_speed: Speed, m/s, up to which walls hold what moves in simulation; None where nothing can touch.
     """
 
     name: str
     xml: str
     assets: dict[str, bytes]
     owners: dict[str, str]
+    wall_speed: float | None
 
 
 def compile_mjcf(
@@ -49,6 +61,7 @@ def compile_mjcf(
     environment = assembly.environment
     keys = _keys(space, environment.tasks)
     step = time_step(assembly, options.acceleration(gravity_of_file(environment)))
+    speed = wall_speed(assembly, pairs, step)
     driven: dict[str, Drive] = {}
     if options.actuators is not None:
         driven = drives(assembly.robots, space, list(keys.values()), CLOSED * assembly.extent, step, log)
@@ -56,7 +69,7 @@ def compile_mjcf(
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs), damped)
     compilation.assets.plan([p.mesh for p in assembly.parts()])
     root = etree.Element("mujoco", model=plain(environment.name))
-    add_settings(root, assembly, pairs, options, step, damped=bool(damped))
+    add_settings(root, assembly, pairs, options, step, speed, damped=bool(damped))
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")
@@ -74,6 +87,7 @@ def compile_mjcf(
     if options.sensors:
         add_sensors(root, space)
     _report_unused(assembly, options, log)
+    report_contacts(assembly, pairs, step, 4 if integrator(assembly, damped=bool(damped)) == "RK4" else 1, log)
     _add_keyframes(root, space, keys, driven if options.actuators == "position" else {})
     text = to_text(root)
     return Document(
@@ -81,6 +95,7 @@ def compile_mjcf(
         f"{_header(assembly, options)}\n{text}",
         compilation.assets.files,
         compilation.owners,
+        speed,
     )
 
 

@@ -6,7 +6,6 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.assembly import Assembly, Part
 from ..limits import LARGEST
@@ -14,6 +13,7 @@ from ..model.environment import Boundary, Environment
 from ..options import Options
 from ..pairs import PairTable
 from ..transforms import Array
+from .dense_contacts import memory
 from .joints import STANDARD_GRAVITY
 from .markup import ASSET_FOLDER, Element, add, comment, number, numbers
 
@@ -52,48 +52,44 @@ def integrator(assembly: Assembly, *, damped: bool) -> str:
     return "RK4" if jointed and not damped else "implicitfast"
 
 
+def wall_speed(assembly: Assembly, pairs: PairTable, step: float) -> float | None:
+    """Return the speed, m/s, up to which walls hold what moves, however thin they are; None where nothing can touch.
+
+    MuJoCo pushes a body out of a thin wall the short way: back, unless more than half of the body is beyond it. So no
+    link may travel half its width in a step; a fifth less, because it takes more than one step to stop it.
+
+    Args:
+        assembly: The scene.
+        pairs: Which bodies are tested.
+        step: Time step, seconds.
+    """
+    names = {n for p in pairs.tested if not p.constant for n in (p.link, p.other)}
+    widths = [_width(p) for p in assembly.links if p.name in names]
+    return float(f"{0.8 * min(widths) / (2 * step):.2g}") if widths else None
+
+
+def _width(part: Part) -> float:
+    """Return the least extent of a mesh along its principal axes and along those of its frame."""
+    used = part.mesh.used_vertices
+    turned = used @ np.linalg.eigh(np.cov(used.T))[1]
+    return float(np.minimum(np.ptp(used, axis=0), np.ptp(turned, axis=0)).min())
+
+
 def _thickness(part: Part) -> float:
     """Return the least side of a mesh's box; sheets count as a twentieth of their diagonal."""
     used = part.mesh.used_vertices
     return max(float(np.min(np.ptp(used, axis=0))), part.mesh.diagonal / 20)
 
 
-LEAST_MEMORY, MOST_MEMORY = 8 << 20, 1 << 30
-"""Bytes of contacts and their forces: up to these MuJoCo's own choice of memory will do, and beyond those none is asked
-for. Memory is not used, only reserved, until something touches."""
-
-# Measured on shells pressed into each other: contacts of two cells, and of the cells of one body with another body.
-_CONTACTS_OF_CELLS, _CONTACTS_OF_SHELLS = 8, 20
-
-
-def possible_contacts(assembly: Assembly, pairs: PairTable) -> NDArray[np.int64]:
-    """Return how many contacts each tested pair of bodies can have in MuJoCo, about and at most, (npairs,)."""
-    # A box that stands for a body is one piece of it, too.
-    cells = {p.name: len(p.shape.pieces) if p.shape else 0 for p in assembly.parts()}
-    both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
-    a, b = both.T
-    return np.minimum(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * np.maximum(a, b))
-
-
-def memory(assembly: Assembly, pairs: PairTable) -> int:
-    """Return how many bytes MuJoCo needs for the contacts that a scene can have; 0 where its own choice will do.
-
-    A contact has 0.6 kB, and four rows of forces of 0.25 kB and 24 bytes for each degree of freedom that it acts on.
-    """
-    motions = {n: r.kinematics.dim for r in assembly.robots for n in r.names}
-    moved = [motions[p.link] + (motions[p.other] if p.kind == "robot" else 0) for p in pairs.tested]
-    row = 250 + 24 * np.array(moved, dtype=np.int64)
-    needed = int(possible_contacts(assembly, pairs) @ (624 + 4 * row))
-    if needed <= LEAST_MEMORY:
-        return 0
-    # What MuJoCo would choose, at most: its solver needs room, too.
-    total = sum(r.kinematics.dim for r in assembly.robots)
-    chosen = (16 << 20) + 36_000 * total + 72 * total * total
-    return 0 if chosen > MOST_MEMORY else min(1 << (chosen + needed - 1).bit_length(), MOST_MEMORY)
-
-
 def add_settings(
-    root: Element, assembly: Assembly, pairs: PairTable, options: Options, step: float, *, damped: bool
+    root: Element,
+    assembly: Assembly,
+    pairs: PairTable,
+    options: Options,
+    step: float,
+    speed: float | None,
+    *,
+    damped: bool,
 ) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults.
 
@@ -103,6 +99,7 @@ def add_settings(
         pairs: Which bodies are tested.
         options: Those of the conversion.
         step: Time step, seconds.
+        speed: What `wall_speed` returns.
         damped: Whether the joints have damping.
     """
     add(root, "compiler", angle="radian", autolimits="true", meshdir=ASSET_FOLDER)
@@ -114,10 +111,12 @@ def add_settings(
         else "implicitfast: it takes damping implicitly."
     )
     contact = float(f"{2.5 * step:.3g}")
+    walls = [] if speed is None else [f"At that step walls hold what is no faster than {number(speed)} m/s."]
     comment(
         root,
         [
             "timestep: a seventieth of the time in which the thinnest link falls by its own thickness, at most 2 ms.",
+            *walls,
             f"integrator: {why}",
             f"solref: contacts settle within {number(contact)} s, 2.5 steps: with MuJoCo's default of 0.02 s",
             "a fast body sinks deeper than thin walls are thick.",
@@ -144,7 +143,7 @@ def add_settings(
     # Thin cells have no volume to speak of; all masses are explicit.
     add(default, "mesh", inertia="shell")
     add(default, "geom", solref=f"{number(contact)} 1")
-    # Loops give way with forces, as contacts do: stiff, so that it is little.
+    # Loops give way with forces, as contacts do: stiff, so that it is less than 1e-4 of the extent where they swing.
     add(default, "equality", solref=f"{number(contact)} 1", solimp="0.99 0.9999 0.001")
     drawn = add(default, "default", class_="visual")
     add(drawn, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")

@@ -12,7 +12,7 @@ from ..contact.arena import ROOM_HINT, lack, new_data
 from ..contact.exact.engine import require
 from ..diagnostics import DiagnosticLog
 from ..errors import Span
-from ..mjcf.scenery import possible_contacts
+from ..mjcf.dense_contacts import possible_contacts
 from ..model.environment import Dialect, Environment
 from ..options import OptionKeywords, Options, PathArgument
 from ..pairs import Pair

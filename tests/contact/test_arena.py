@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import itertools
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
-from scenes import box_mesh, fault, free_cube, notched_block, write_scene
+from scenes import MODELS, box_mesh, fault, free_cube, notched_block, write_scene
 from truth import Truth
 
 import env2mjcf
 from env2mjcf.cli.main import main
+from env2mjcf.contact.arena import lack
 from env2mjcf.contact.mujoco_engine import MujocoEngine
-from env2mjcf.mjcf import scenery
+from env2mjcf.mjcf import dense_contacts, scenery
 from env2mjcf.simulation import loading
 
 # The half section of a closed bottle with walls, radius and height, from the middle of its foot to that of its floor.
@@ -59,6 +62,15 @@ def eight_about_one(folder: Path, sides: int) -> Path:
     ]
     robot = "1\nbottle.g Volumetric Rotational\nConnections\n0\n"
     return write_scene(folder, free_cube(*(f"bottle.g {p}" for p in poses), robot=robot), bottle=bottle(sides))
+
+
+def robots_in_one_place(folder: Path, mesh: str, count: int) -> Path:
+    """Robots of one mesh of the spherical arm, all at the origin at home."""
+    shutil.copy(MODELS / "spherical-arm" / "meshes" / f"{mesh}.g", folder)
+    robot = f"Active\n1\n{mesh}.g Volumetric Rotational\nConnections\n0\n\n"
+    path = folder / "stack.env"
+    path.write_text(f"Boundary Box [-9:9;-9:9;-9:9]\n\nMultiBodies\n{count}\n\n{count * robot}")
+    return path
 
 
 def star(links: int) -> str:
@@ -191,9 +203,9 @@ class TestMemory:
             compiled = env2mjcf.load(path, collision="surface", primitives=primitives, engine="mujoco").compiled
             cells = [sum(n.startswith(f"{name}:") for n in compiled.document.owners) for name in ("cube", "cube_2")]
             assert min(cells) > 1
-            # 8 contacts of two cells, at most, and 20 of each cell with the other body.
-            expected = min(8 * cells[0] * cells[1], 20 * max(cells))
-            assert scenery.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
+            # 8 contacts of two cells, at most, and 40 of each cell with the other body.
+            expected = min(8 * cells[0] * cells[1], 40 * max(cells))
+            assert dense_contacts.possible_contacts(compiled.assembly, compiled.pairs).tolist() == [expected]
 
     @pytest.mark.parametrize("sides", [8, pytest.param(48, marks=pytest.mark.slow)])
     def test_what_is_written_steps_in_plain_mujoco(self, folder: Path, sides: int) -> None:
@@ -207,12 +219,13 @@ class TestMemory:
         assert not list(folder.rglob("MUJOCO_LOG.TXT"))
 
     def test_no_more_is_asked_for_than_is_sane(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(scenery, "MOST_MEMORY", 20 << 20)
+        monkeypatch.setattr(dense_contacts, "MOST_MEMORY", 20 << 20)
         scene = env2mjcf.load(write_scene(folder, star(80)), engine="mujoco")
         assert re.findall(r'<size memory="(.*)"/>', scene.xml) == ["20M"]
         said = [d for d in scene.diagnostics if d.code == "MJC405"]
         assert [d.severity for d in said] == ["warning"]
         assert "at home" in said[0].message
+        assert ["gets 0.0195" in d.message for d in scene.diagnostics if d.code == "MJC419"] == [True]
         # Verdicts, contacts and places are there all the same.
         assert scene.in_collision(scene.space.home)
         pairs = {frozenset(p) for p in itertools.combinations(scene.link_names[1:], 2)}
@@ -230,6 +243,74 @@ class TestMemory:
         scene = env2mjcf.load(write_scene(folder, free_cube("3 0 0 0 0 0")))
         scene.set(scene.space.home)
         assert scene.data.warning.number.max() == 0
+
+    @pytest.mark.parametrize("mesh", ["hand", pytest.param("hoop", marks=pytest.mark.slow)])
+    def test_two_bodies_in_one_place_need_what_is_reckoned_with(self, folder: Path, mesh: str) -> None:
+        scene = env2mjcf.load(robots_in_one_place(folder, mesh, 2), engine="mujoco")
+        compiled = scene.compiled
+        data = mujoco.MjData(scene.model)
+        mujoco.mj_forward(scene.model, data)
+        possible = int(dense_contacts.possible_contacts(compiled.assembly, compiled.pairs).sum())
+        assert 0.5 * possible <= data.ncon <= possible
+        needed = dense_contacts.contact_memory(compiled.assembly, compiled.pairs)
+        assert 0.3 * needed <= data.maxuse_arena + data.maxuse_stack <= needed
+
+    @pytest.mark.parametrize("robots", [8, pytest.param(32, marks=pytest.mark.slow)])
+    def test_robots_in_one_place_are_held(self, folder: Path, robots: int) -> None:
+        result = env2mjcf.convert(robots_in_one_place(folder, "hand", robots), folder / "out")
+        step = [sys.executable, "-c", STEP, str(result.xml), "home"]
+        done = subprocess.run(step, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        contacts, forces, warned = map(int, done.stdout.split())
+        assert contacts > 200 * robots * (robots - 1) / 2
+        assert (forces, warned) == (4 * contacts, 0)
+
+
+class TestDensePairs:
+    def test_what_many_contacts_cost_is_said_with_a_figure(self, folder: Path) -> None:
+        obstacle = free_cube("bottle.g 9 0 0 0 0 0", robot="1\nbottle.g Volumetric Rotational\nConnections\n0\n")
+        scene = env2mjcf.load(write_scene(folder, obstacle, bottle=bottle(48)), engine="mujoco")
+        (said,) = (d for d in scene.diagnostics if d.code == "MJC419")
+        assert said.severity == "info"
+        cells = [sum(n.startswith(f"{b}:") for n in scene.compiled.document.owners) for b in ("bottle", "bottle_2")]
+        assert f"bottle and bottle_2, {cells[0]} and {cells[1]} convex pieces" in said.message
+        assert "coacd" in said.hint
+        assert "exclude_pairs" in said.hint
+        # Pressed into each other, they have about as many contacts as is said.
+        expected = float(re.findall(r"can have ([\d,]+) contacts", said.message)[0].replace(",", ""))
+        data, rng, found = mujoco.MjData(scene.model), np.random.default_rng(0), []
+        for _ in range(30):
+            q = np.array([9, 0, 0, 0, 0, 0]) + rng.uniform(-1, 1, 6) * [0.4, 0.4, 0.4, 3, 3, 3]
+            data.qpos[:] = scene.space.qpos(q)
+            mujoco.mj_kinematics(scene.model, data)
+            mujoco.mj_collision(scene.model, data)
+            found.append(data.ncon)
+        assert expected / 4 < max(found) < 2 * expected
+
+    def test_where_contacts_are_few_nothing_is_said(self, folder: Path) -> None:
+        text = free_cube("notched.g 3 0 0 0 0 0", "0 3 0 0 0 0")
+        scene = env2mjcf.load(write_scene(folder, text, notched=notched_block()), engine="mujoco")
+        assert not [d for d in scene.diagnostics if d.code == "MJC419"]
+
+
+@pytest.mark.parametrize(
+    ("memory", "said", "warned"),
+    [
+        ("20K", "out of memory", True),
+        ("100K", r"its memory of 0\.0977 MB is full after \d+ contacts", True),
+        ("200K", r"its memory of 0\.195 MB has no room for the forces of 190 contacts", True),
+        ("2000K", "^$", False),
+    ],
+)
+def test_what_memory_lacks_is_said_and_counted(memory: str, said: str, warned: bool) -> None:
+    """Twenty balls in one place: each of 190 pairs has a contact, and four forces."""
+    balls = '<body><freejoint/><geom size="1"/></body>' * 20
+    text = f'<mujoco><size memory="{memory}"/><worldbody>{balls}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    assert re.search(said, lack(mujoco.mj_forward, model, data))
+    assert bool(data.warning.number.any()) is warned
+    assert warned or (data.ncon, data.nefc) == (190, 760)
 
 
 class TestEightBottles:

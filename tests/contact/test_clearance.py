@@ -219,6 +219,18 @@ def test_a_certified_edge_has_no_collision_at_fine_steps(name: str) -> None:
     assert proved
 
 
+def test_a_body_whose_middle_is_empty_hides_no_nearer_one(tmp_path: Path) -> None:
+    """The cube flies in the middle between two plates of one body; a small cube beside it is nearer than these."""
+    plates = trimesh.util.concatenate(
+        [trimesh.creation.box((0.2, 4, 4), trimesh.transformations.translation_matrix((x, 0, 0))) for x in (-5, 5)]
+    )
+    text = free_cube("plates.g 0 0 0 0 0 0", "small.g 0 3 0 0 0 0")
+    path = write_scene(tmp_path, text, plates=export_byu(plates), small=box_mesh(0.1, 0.1, 0.1))
+    scene = env2mjcf.load(path, engine="mujoco")
+    assert scene.clearance(at(0, 0, 0)) == pytest.approx(3 - 0.1 - 0.5)
+    assert scene.clearance(at(2.5, 0, 0)) == pytest.approx(4.9 - 2.5 - 0.5)
+
+
 @pytest.mark.parametrize("motion", [1.0, 4.0])
 def test_no_stretch_is_passed_over_however_thin_the_obstacle(motion: float) -> None:
     """A point on a line, and an obstacle as thin as a hair anywhere on its way."""

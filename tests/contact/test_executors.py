@@ -11,6 +11,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
@@ -23,6 +24,7 @@ from scenes import free_cube, write_scene
 import env2mjcf
 from env2mjcf.contact import executors as remote
 from env2mjcf.contact.tasks import Chunks
+from env2mjcf.contact.threads import thread_count
 
 ROOT = Path(__file__).parents[2]
 
@@ -159,6 +161,20 @@ def test_a_scene_is_sent_where_it_is_asked_for_and_not_again(cubes: env2mjcf.Sce
     np.testing.assert_array_equal(cubes.in_collision(q, executor=recorder), expected)
 
 
+def test_a_worker_keeps_the_scenes_that_it_used_last() -> None:
+    memory = remote._Memory()
+
+    def scene(k: int) -> bytes:
+        return zlib.compress(pickle.dumps(f"scene {k}"))
+
+    for k in range(4):
+        assert memory.find(str(k), scene(k)) == f"scene {k}"
+    assert memory.find("0", None) == "scene 0"
+    # The fifth takes the place of the one that was used longest ago.
+    assert memory.find("4", scene(4)) == "scene 4"
+    assert [memory.find(str(k), None) for k in range(5)] == ["scene 0", None, "scene 2", "scene 3", "scene 4"]
+
+
 def test_two_scenes_are_never_taken_for_each_other(tmp_path: Path) -> None:
     near_wall = env2mjcf.load(write_scene(tmp_path, free_cube("0.9 0 0 0 0 0")), engine="mujoco")
     far_wall = env2mjcf.load(write_scene(tmp_path, free_cube("1.1 0 0 0 0 0")), engine="mujoco")
@@ -212,6 +228,13 @@ def test_a_slow_first_chunk_is_forgotten() -> None:
         assert rows is not None
         chunks.took(rows.stop - rows.start, (rows.stop - rows.start) * 1e-6)
     assert rows.stop - rows.start > 100_000
+
+
+def test_many_rows_have_every_core_and_few_have_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert [thread_count(None, 10_000_000), thread_count(None, 1), thread_count(3, 1)] == [7, 1, 3]
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert thread_count(None, 10_000_000) == 1
 
 
 def test_wide_rows_make_small_chunks() -> None:

@@ -79,10 +79,11 @@ def test_the_oldest_version_may_hold_configurations() -> None:
     assert rows(f"{HEAD}20001022\n1\n1\n1 2 3 4 5 6 7 8\n", 8) == [(0, (1, 2, 3, 4, 5, 6, 7, 8))]
 
 
-def test_poses_of_six_numbers_are_told_from_six_degrees_of_freedom_by_the_second_line() -> None:
+@pytest.mark.parametrize("version", [20001022, 20001025])
+def test_poses_of_six_numbers_are_told_from_six_degrees_of_freedom_by_the_second_line(version: int) -> None:
     body = "1 2 3 0 0 0\n4 5 6 0 0 0\n"
-    assert read(f"{HEAD}20001022\n2\n1\n{body}", 6, links=(2,))[0].poses is not None
-    assert len(read(f"{HEAD}20001022\n1\n2\n{body}", 6, links=(2,))[0].rows) == 2
+    assert read(f"{HEAD}{version}\n2\n1\n{body}", 6, links=(2,))[0].poses is not None
+    assert len(read(f"{HEAD}{version}\n1\n2\n{body}", 6, links=(2,))[0].rows) == 2
 
 
 @pytest.mark.parametrize("version", [20001022, 20001125, 2012])
@@ -95,11 +96,11 @@ def test_a_second_line_that_lies_is_a_warning(version: int) -> None:
     assert found.poses is not None
 
 
-@pytest.mark.parametrize("version", [20001125, 2012, 2030])
+@pytest.mark.parametrize("version", [20001125, 2012, 2030, 20001023, 1999])
 def test_a_second_line_that_lies_makes_no_poses_of_six_degrees_of_freedom(version: int) -> None:
     found, diagnostics = read(f"{HEAD}{version}\n2\n2\n1 2 3 0 0 0\n4 5 6 0 0 0\n", 6, links=(2,))
     assert len(found.rows) == 2
-    assert [d.code for d in diagnostics] == ["CFG512", "CFG513"][version != 2030 :]
+    assert [d.code for d in diagnostics] == ["CFG512", "CFG513"][version in (20001125, 2012) :]
 
 
 def test_a_third_line_that_lies_is_a_warning_at_its_place() -> None:
@@ -163,6 +164,14 @@ def test_bad_input_is_refused_where_it_stands(text: str, code: str, message: str
     assert message in found.message
     assert found.span is not None
     assert found.span.line == line
+
+
+def test_poses_are_as_many_as_divide_the_rows() -> None:
+    """A second line that lies: four rows are no poses of three links, with the fixed base, but of two."""
+    found, diagnostics = read(f"{HEAD}20001022\n1\n2\n" + "1 2 3 0 0 0\n" * 4, 9, links=(3, 2))
+    assert found.poses is not None
+    assert found.poses.shape == (2, 2, 6)
+    assert [d.code for d in diagnostics] == ["CFG513"]
 
 
 def test_poses_of_another_robot_are_refused() -> None:

@@ -160,6 +160,13 @@ def test_bad_input_is_refused_where_it_stands(text: str, code: str, line: int) -
     assert found.span.line == line
 
 
+@pytest.mark.parametrize(
+    ("row", "hint"), [("0 1 2 0.5", "another scene"), ("0 1 2 1e101", "must not be larger"), ("0 1 2 1,5", "point")]
+)
+def test_what_to_do_about_a_word_depends_on_the_word(row: str, hint: str) -> None:
+    assert hint in refused(f"#####GRAPHSTART#####\n1 0 1\n{row}{STOP}", 2).hint
+
+
 def test_declared_counts_are_compared_and_not_believed() -> None:
     for counts in ("2 2 3", "4 2 3", "3 1 3", "3 3 3", f"{10**15} 2 3", f"3 {10**15} 3"):
         found, diagnostics = read(V061300.replace("3 2 3", counts), 2)

@@ -12,6 +12,7 @@ from texts import PROBLEM, ROBOT, XML_ENVIRONMENT, XML_ROBOT, B, E, Reader, code
 
 import env2mjcf
 from env2mjcf.errors import Severity
+from env2mjcf.formats import xml
 from env2mjcf.kinematics.forward import RobotKinematics
 from env2mjcf.limits import Limits
 from env2mjcf.model.environment import BaseKind, BoundaryShape, DHForm, Dialect, JointType, MultiBodyKind, Recentring
@@ -416,6 +417,15 @@ def test_fewer_links_than_none_are_refused(problem: Reader, name: str) -> None:
     assert (found.code, found.span and found.span.text[found.span.column - 1 :][:2]) == ("ENV110", "-5")
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"), [("true", True), ("TRUE", True), (" 1 ", True), ("False", False), ("0", False), ("yes", None)]
+)
+def test_flags_are_words_or_digits(problem: Reader, word: str, meant: bool | None) -> None:
+    scene = problem(PROBLEM.replace('ignoreSelfCollision="false"', f'ignoreSelfCollision="{word}"'))
+    assert scene.planner_rules.ignore_self_collision is meant
+    assert ("ENV213" in codes(scene)) is (meant is None)
+
+
 def test_leading_zeros_do_not_make_a_number_large(problem: Reader) -> None:
     scene = problem(PROBLEM.replace('ignoreAdjacentLinks="true"', f'ignoreIAdjacentLinks="{"0" * 5000}2"'))
     assert scene.planner_rules.adjacent_links == 2
@@ -529,6 +539,27 @@ def test_what_is_not_well_formed_is_refused(read: Reader, text: str) -> None:
 
 def test_deep_nesting_is_refused_not_recursed(read: Reader) -> None:
     assert fault(read, "<Environment>" + "<a>" * 100_000 + "</a>" * 100_000 + "</Environment>").code == "ENV180"
+
+
+@pytest.mark.parametrize("text", ["<a>" * 100_000, "<Environment>" + "<a/>" * 100_000])
+def test_a_hostile_text_is_refused_before_most_of_it_is_parsed(
+    read: Reader, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fed: list[int] = []
+    parser = xml.etree.XMLPullParser
+
+    class Counting:
+        def __init__(self, *arguments: object, **options: object) -> None:
+            self.parser = parser(*arguments, **options)
+            self.read_events, self.close = self.parser.read_events, self.parser.close
+
+        def feed(self, data: bytes) -> None:
+            fed.append(len(data))
+            self.parser.feed(data)
+
+    monkeypatch.setattr(xml.etree, "XMLPullParser", Counting)
+    assert fault(read, text, limits=Limits(elements=1000)).code == "ENV180"
+    assert sum(fed) < len(text) / 10
 
 
 def test_an_xml_file_cannot_be_forced_into_another_dialect(read: Reader) -> None:

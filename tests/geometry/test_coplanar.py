@@ -186,3 +186,37 @@ def test_corpus_surfaces_are_kept(corpus: Path) -> None:
 def test_a_curved_mesh_stays_as_it_is() -> None:
     ball = trimesh.creation.icosphere(2)
     assert len(merged(Mesh.from_arrays("ball", ball.vertices, ball.faces))[2]) == len(ball.faces)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sheet_that_is_flat_to_the_tolerance_is_as_good_as_flat(seed: int) -> None:
+    sheet, tolerance = grid(8), 1e-6
+    rough = sheet.vertices + np.random.default_rng(seed).uniform(-0.5, 0.5, (81, 1)) * [0, 0, tolerance]
+    polygons = convex_polygons(rough, sheet.faces, tolerance)
+    assert len(polygons) <= 8
+    assert sorted(f for p in polygons for f in p.faces) == list(range(128))
+    flat = [sheet.vertices[list(p.loop)] for p in polygons]
+    areas = [np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)[2] / 2 for p in flat]
+    assert sum(areas) == pytest.approx(np.prod(np.ptp(sheet.vertices, axis=0)[:2]), rel=1e-12)
+    # Ten times as rough, it is not.
+    assert len(convex_polygons(sheet.vertices + 10 * (rough - sheet.vertices), sheet.faces, tolerance)) > 8
+
+
+@pytest.mark.parametrize("bend", [0.5, 12.0])
+def test_a_corner_is_off_the_plane_by_no_more_than_the_tolerance(bend: float) -> None:
+    """A strip that bends evenly: cut where the chord of its parabola is as high as the tolerance allows."""
+    n, tolerance = 40, 1e-5
+    x = np.arange(n + 1.0)
+    vertices = np.array([[a, b, bend * tolerance * (a / n) ** 2] for a in x for b in (0.0, 1.0)])
+    first = 2 * np.arange(n)
+    faces = np.concatenate(
+        [np.column_stack([first, first + 2, first + 3]), np.column_stack([first, first + 3, first + 1])]
+    )
+    polygons = convex_polygons(vertices, faces, tolerance)
+    assert (len(polygons) == 1) == (bend < 1)
+    for polygon in polygons:
+        corners = vertices[list(polygon.loop)]
+        # The plane that fits best, by its singular values.
+        local = corners - corners.mean(axis=0)
+        normal = np.linalg.svd(local)[2][2]
+        assert np.abs(local @ normal).max() <= 1.01 * tolerance

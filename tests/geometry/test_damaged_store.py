@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import os
 import random
+import struct
 import subprocess
 import sys
+import time
 import tracemalloc
 import zipfile
 from collections.abc import Callable
@@ -97,6 +99,23 @@ def test_an_entry_that_would_be_huge_is_not_unpacked(make: Callable[[Path], None
     finally:
         tracemalloc.stop()
     assert asked(entry.parent) == (0, [])
+
+
+def overlapping(path: Path) -> None:
+    """Write a quarter of a megabyte, and a list of parts that names it 50,000 times: 13 gigabytes."""
+    np.savez(path, f=np.zeros(1 << 15))
+    data, parts = path.read_bytes(), 50_000
+    directory, end = data.index(b"PK\1\2"), data.index(b"PK\5\6")
+    listed = data[directory:end] * parts
+    numbers = struct.pack("<HHII", parts, parts, len(listed), directory)
+    path.write_bytes(data[:directory] + listed + data[end : end + 8] + numbers + bytes(2))
+
+
+def test_an_entry_whose_parts_overlap_is_refused_before_they_are_read(entry: Path) -> None:
+    overlapping(entry)
+    start = time.process_time()
+    assert asked(entry.parent) == (1, ["GEO260"])
+    assert time.process_time() - start < 3
 
 
 def test_a_pipe_in_its_place_is_not_waited_for(entry: Path) -> None:

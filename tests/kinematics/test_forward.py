@@ -190,3 +190,29 @@ def test_no_point_moves_further_than_its_lever_says(tmp_path: Path, dof: int) ->
     farthest = np.linalg.norm(moved, axis=-1).max(axis=(0, 2))
     assert (farthest <= levers[dof] * 1e-4 * (1 + 1e-6) + 1e-15).all()
     assert farthest.max() > 0.1 * levers[dof].max() * 1e-4
+
+
+TRIANGLE = """Boundary Box [-9:9 ; -9:9 ; -9:9]
+Multibodies
+1
+Active
+3
+cube.g Fixed 0 0 0 0 0 0
+cube.g Joint
+cube.g Joint
+Connections
+3
+0 1 Revolute -1:1
+1 0 0 0 0 0  0 0 0 0  0 0 0 0 0 0
+0 2 NonActuated
+-1 0 0 0 0 0  0 0 0 0  0 0 0 0 0 0
+1 2 NonActuated
+-2 0 0 0 0 0  0 0 0 0  0 0 0 0 0 0
+"""
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-3, 0.7, math.pi])
+def test_a_loop_is_open_by_what_its_end_is_away_and_turned(tmp_path: Path, angle: float) -> None:
+    """The loop's last body lies two units from a hinge: its place there moves by a chord, and it turns by as much."""
+    robot = robot_of(tmp_path, TRIANGLE)
+    assert robot.loop_gaps(np.array([angle]), [0, 0, 0.3]) == pytest.approx(2 * (2 + 0.3) * math.sin(angle / 2))

@@ -11,6 +11,9 @@ import pytest
 from scenes import MODEL_FILES, MODELS, free_cube, write_scene
 
 import env2mjcf
+from env2mjcf.kinematics.forward import RobotKinematics
+from env2mjcf.kinematics.space import ConfigurationSpace
+from env2mjcf.model.environment import BaseKind, Body, Boundary, BoundaryShape, Dialect, MultiBody, MultiBodyKind
 
 
 @pytest.fixture(params=MODEL_FILES, ids=lambda p: p.stem)
@@ -117,3 +120,44 @@ def test_a_bad_configuration_is_named(tmp_path: Path, q: object, message: str) -
     for query in (scene.in_collision, scene.is_valid, scene.link_poses, scene.loop_error):
         with pytest.raises(ValueError, match=message):
             query(q)
+
+
+def test_what_has_no_limits_is_drawn_from_the_obstacles_grown_by_the_robot(tmp_path: Path) -> None:
+    text = "2\nActive\n1\ncube.g Volumetric Translational\nConnections\n0\nPassive\ncube.g 20 5 -3 0 0 0\n"
+    space = env2mjcf.load(write_scene(tmp_path, text)).space
+    lower, upper = space.sample_limits
+    reach = 0.5 + math.sqrt(0.75)  # half a cube, and the corner of the one that flies
+    np.testing.assert_allclose(lower, np.array([20, 5, -3]) - reach)
+    np.testing.assert_allclose(upper, np.array([20, 5, -3]) + reach)
+
+
+@pytest.mark.parametrize(
+    ("given", "drawn"),
+    [
+        ((-np.inf, 4.0), (-2.0, 4.0)),  # the obstacles' side, for it is below the limit
+        ((-np.inf, -7.0), (-11.0, -7.0)),  # the box's size below it, for it is not
+        ((1.0, np.inf), (1.0, 2.0)),
+        ((7.0, np.inf), (7.0, 11.0)),
+        ((-7.0, 7.0), (-7.0, 7.0)),
+    ],
+)
+def test_what_has_one_limit_is_drawn_beside_it(given: tuple[float, float], drawn: tuple[float, float]) -> None:
+    flat = MultiBody(MultiBodyKind.ACTIVE, (Body("a.g", BaseKind.PLANAR_TRANSLATIONAL),), dialect=Dialect.D)
+    robot = RobotKinematics.of(flat)
+    box = np.full(3, -2.0), np.full(3, 2.0)
+    limits = Boundary(BoundaryShape.BOX2D, lower=(given[0], 0.0), upper=(given[1], 1.0))
+    space = ConfigurationSpace([robot], ["x", "y"], [np.zeros(2)], limits, 1.0, box)
+    lower, upper = space.sample_limits
+    assert (lower.tolist(), upper.tolist()) == ([drawn[0], 0.0], [drawn[1], 1.0])
+
+
+def test_robots_that_a_query_does_not_name_stand_at_home() -> None:
+    scene = env2mjcf.load(MODELS / "two-robots/two-robots.env", query=MODELS / "two-robots/two-robots.query")
+    car, arm = scene.space.robot_slices
+    (task,) = [t for t in scene.compiled.environment.tasks if t.robots == (1,)]
+    (q,) = scene.space.of_tasks([task])
+    # The file's own theta of each joint, in radians.
+    np.testing.assert_allclose(scene.space.home[arm], [-2.2, 1.1, -1.3])
+    (of_car,) = scene.space.of_tasks([t for t in scene.compiled.environment.tasks if t.robots == (0,)])
+    np.testing.assert_allclose(of_car[:, arm], [[-2.2, 1.1, -1.3]] * len(of_car))
+    np.testing.assert_array_equal(q[:, car], np.zeros((len(q), 3)))

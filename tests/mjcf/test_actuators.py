@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
-from chains import write_chain
+from chains import write_chain, write_loop
 from real_scenes import real_scene, scene_names
 from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf import Scene
-from env2mjcf.mjcf.actuators import mass_matrix
+from env2mjcf.diagnostics import DiagnosticLog
+from env2mjcf.errors import FormatError
+from env2mjcf.mjcf.actuators import drives, mass_matrix
 from env2mjcf.options import Actuators
 
 JOINTED = ("gantry/gantry.env", "seed/seed.env", "spherical-arm/spherical-arm.env", "xml-arm/xml-arm.xml",
@@ -34,7 +37,10 @@ def driven(model: mujoco.MjModel) -> np.ndarray:
 
 
 def follow(scene: Scene, by: float, seconds: float) -> tuple[float, float, float]:
-    """Move the targets of all hinges; return the last second's swing, the error at the end, and the overshoot."""
+    """Move the targets of all hinges; return the last second's swing, the error at the end, and the overshoot.
+
+    Contacts are off: links that start side by side touch when their hinges turn, and some homes collide.
+    """
     model, data = scene.model, without_contacts(scene)
     at = driven(model)
     data.ctrl += by * (model.jnt_type[model.actuator_trnid[:, 0]] == mujoco.mjtJoint.mjJNT_HINGE)
@@ -190,8 +196,11 @@ def test_sensors_and_tools_are_written_on_request() -> None:
     assert [several.site(i).name for i in range(several.nsite)] == ["robot0/tool", "robot1/tool"]
 
 
-def energy_gain(scene: Scene, seconds: float) -> float:
-    """Return how much energy a scene gains from home without contacts and limits, in weights times extents."""
+def energy_gain(scene: Scene, seconds: float, most_open: float = math.inf) -> float:
+    """Return how much energy a scene gains from home without contacts and limits, in weights times extents.
+
+    Its loops must not open by more than `most_open`.
+    """
     model = scene.model
     model.jnt_limited[:] = 0
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -201,6 +210,8 @@ def energy_gain(scene: Scene, seconds: float) -> float:
     while data.time < seconds:
         mujoco.mj_step(model, data)
         highest = max(highest, float(data.energy.sum()))
+        gaps = data.efc_pos[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]
+        assert np.abs(gaps).max(initial=0.0) <= most_open
     assert not data.warning.number.any()
     return (highest - first) / (9.81 * float(model.body_mass.sum()) * scene.extent)
 
@@ -211,11 +222,142 @@ def test_undamped_chains_keep_their_energy(hinges: int, seconds: float, tmp_path
     assert energy_gain(env2mjcf.load(write_chain(tmp_path, hinges)), seconds) < 0.01
 
 
+@pytest.mark.parametrize("seed", range(13))
+@pytest.mark.slow
+def test_loops_stay_closed_and_keep_their_energy(seed: int, tmp_path: Path) -> None:
+    scene = env2mjcf.load(write_loop(tmp_path, seed))
+    assert scene.model.neq == 2
+    assert energy_gain(scene, 60.0, most_open=1e-4 * scene.extent) < 0.01
+
+
+def with_query(name: str, **options: Any) -> Scene:
+    """Load a real scene with its query, where it has one that fits."""
+    real = real_scene(name)
+    try:
+        return env2mjcf.load(real.env, query=real.query, **real.keywords, **options)
+    except FormatError:
+        return env2mjcf.load(real.env, **real.keywords, **options)
+
+
+def free_keys(scene: Scene) -> list[tuple[int, bool]]:
+    """Return the keys and whether nothing touches there."""
+    places = scene.space.from_qpos(scene.model.key_qpos)
+    return [(k, not hit) for k, hit in enumerate(scene.in_collision(places, engine="mujoco"))]
+
+
+def highest_energy(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> float:
+    """Simulate; return the gain of energy, in weights, looked at every 20 steps."""
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    mujoco.mj_forward(model, data)
+    values = [float(data.energy.sum())]
+    for _ in range(round(seconds / model.opt.timestep / 20)):
+        mujoco.mj_step(model, data, 20)
+        # Of the state that the last of these steps began with.
+        values.append(float(data.energy.sum()))
+    return (max(values) - values[0]) / (9.81 * float(model.body_mass.sum()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scene_names())
+def test_nothing_falls_through_the_ground_from_any_key(corpus: Path, name: str) -> None:
+    scene = with_query(name, ground=True)
+    model, data = scene.model, mujoco.MjData(scene.model)
+    if not model.nv:
+        pytest.skip("nothing moves")
+    for key, free in free_keys(scene):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        gain = highest_energy(model, data, 2.0)
+        assert gain < 0.01 * scene.extent or not free
+        for part in scene.compiled.assembly.links:
+            place = data.body(part.name)
+            low = float((part.used_vertices @ place.xmat.reshape(3, 3)[2]).min() + place.xpos[2])
+            assert low > model.geom("ground").pos[2] - 1e-3 * scene.extent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scene_names())
+def test_a_minute_of_every_scene_passes_without_warnings(corpus: Path, name: str) -> None:
+    scene = with_query(name)
+    model, data = scene.model, mujoco.MjData(scene.model)
+    keys = [k for k, free in free_keys(scene) if free] if model.nv else []
+    if not keys:
+        pytest.skip("nothing moves, or touches at every key")
+    # From the start, where it is free.
+    mujoco.mj_resetDataKeyframe(model, data, 1 if 1 in keys else keys[0])
+    assert highest_energy(model, data, 60.0) < 0.01 * scene.extent
+    assert not data.warning.number.any()
+
+
+def crossings(begin: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> int:
+    """Return how many triangles (n, 3, 3) a line between two points crosses (Moeller and Trumbore, 1997)."""
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    across = np.cross(end - begin, b)
+    size = (a * across).sum(axis=1)
+    facing = np.flatnonzero(np.abs(size) > 1e-12 * np.abs(across).max(initial=1.0))
+    offset = (begin - triangles[:, 0])[facing]
+    turned = np.cross(offset, a[facing])
+    u = (offset * across[facing]).sum(axis=1) / size[facing]
+    v = turned @ (end - begin) / size[facing]
+    t = (b[facing] * turned).sum(axis=1) / size[facing]
+    return int(((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1)).sum())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scene_names())
+def test_goal_targets_push_nothing_through_walls(corpus: Path, name: str) -> None:
+    scene = with_query(name, actuators="position")
+    model, data = scene.model, mujoco.MjData(scene.model)
+    if not model.nu or model.nkey < 3 or (model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any():
+        pytest.skip("no task, or a base that is not driven")
+    if not all(free for _, free in free_keys(scene)[1:]):
+        pytest.skip("start or goal is not free")
+    mujoco.mj_resetDataKeyframe(model, data, 1)
+    data.ctrl[:] = model.key_ctrl[2]
+    assembly = scene.compiled.assembly
+    size = min(p.mesh.diagonal for p in assembly.links)
+    walls = [(o.mesh.vertices @ o.mesh_pose[:3, :3].T + o.mesh_pose[:3, 3])[o.mesh.faces] for o in assembly.obstacles]
+    places: list[np.ndarray] = []
+    deepest = 0.0
+    for n in range(round(6 / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        deepest = min(deepest, float(data.contact.dist.min(initial=0.0)))
+        if n % 50 == 0:
+            places.append(data.qpos.copy())
+    q = scene.space.from_qpos(np.array(places))
+    assert -deepest < 0.05 * size
+    assert scene.clearance(q[::4]).min() > -0.05 * size
+    centers = scene.link_poses(q)[:, :, :3, 3] - assembly.origin
+    for wall in walls:
+        assert not sum(
+            crossings(a, b, wall) for a, b in zip(centers[:-1].reshape(-1, 3), centers[1:].reshape(-1, 3), strict=True)
+        )
+
+
 def test_the_time_step_is_rounded_down(tmp_path: Path) -> None:
     # A seventieth of the time in which it falls by its thickness is 1.58 ms.
     thickness = 9.81 * (70 * 1.58e-3) ** 2 / 2
     scene = env2mjcf.load(write_chain(tmp_path, 1, 2.0, thickness))
     assert scene.model.opt.timestep == 1e-3
+
+
+def test_targets_keep_the_limits_of_joints_that_have_any(tmp_path: Path) -> None:
+    later = env2mjcf.load(write_chain(tmp_path, 2), actuators="position").model
+    assert later.actuator_ctrllimited.tolist() == [1, 1]
+    np.testing.assert_allclose(later.actuator_ctrlrange, [[-math.pi, math.pi]] * 2)
+    turning = env2mjcf.load(MODELS / "seed/seed.env", actuators="position").model
+    assert not turning.actuator_ctrllimited.any()
+
+
+def test_no_drive_is_quicker_than_steps_can_follow(tmp_path: Path) -> None:
+    """A critically damped mass swings with w = sqrt(k / m) and is damped by 2 k / w; w is at most 4 a step."""
+    scene = env2mjcf.load(write_chain(tmp_path, 1))
+    data, mass = mujoco.MjData(scene.model), np.zeros((1, 1))
+    mujoco.mj_forward(scene.model, data)
+    mujoco.mj_fullM(scene.model, data, mass)
+    assembly, step = scene.compiled.assembly, 10.0
+    (drive,) = drives(assembly.robots, scene.space, [scene.space.home], 0.0, step, DiagnosticLog()).values()
+    assert drive.stiffness == pytest.approx(mass[0, 0] * (4 / step) ** 2, rel=1e-2)
+    assert drive.damping == pytest.approx(drive.stiffness * step / 2, rel=1e-2)
 
 
 def test_a_ground_beside_gravity_is_reported(tmp_path: Path) -> None:

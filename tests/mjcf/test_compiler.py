@@ -46,6 +46,18 @@ def test_mujoco_puts_links_where_the_chain_does(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("primitives", [False, True])
+def test_obstacles_stand_before_robots(path: Path, primitives: bool) -> None:
+    """MuJoCo takes the normal of the second geom's face where two are nearly parallel: that of what moves."""
+    model = env2mjcf.load(path, primitives=primitives, boundary="solid").model
+    moves = model.body_weldid[model.geom_bodyid] > 0
+    robots = np.flatnonzero(moves & (model.geom_contype > 0))
+    fixed = np.flatnonzero(~moves & (model.geom_contype == 2))  # the mask of obstacles
+    assert len(robots) > 0
+    assert fixed.max(initial=-1) < robots.min()
+
+
+@pytest.mark.parametrize("path", MODEL_FILES, ids=lambda p: p.stem)
 def test_every_moving_body_has_an_explicit_inertia(path: Path) -> None:
     scene = env2mjcf.load(path)
     root = etree.fromstring(scene.xml.encode())
@@ -256,3 +268,26 @@ def test_an_sma_joint_reads_and_does_not_convert(tmp_path: Path) -> None:
     assert caught.value.code == "KIN320"
     assert caught.value.span is not None
     assert caught.value.span.line == 12
+
+
+def test_what_is_mujocos_default_is_left_out(tmp_path: Path) -> None:
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube()))
+    bodies = etree.fromstring(scene.compiled.document.xml.encode()).findall("worldbody/body")
+    assert [dict(b.attrib) for b in bodies] == [{"name": "cube"}]
+
+
+def test_a_joint_that_its_limits_hold_gets_the_least_play(tmp_path: Path) -> None:
+    """MuJoCo refuses a range whose ends are equal."""
+    robot = "2\ncube.g Fixed 0 0 0 0 0 0\ncube.g Joint\nConnections\n1\n0 1 Revolute 0.25:0.25\n" \
+            "2 0 0 0 0 0  0 0 0 0.78539816339744828  0 0 0 0 0 0\n"  # fmt: skip
+    model = env2mjcf.load(write_scene(tmp_path, free_cube(robot=robot))).model
+    held = math.pi / 4
+    assert model.jnt_limited.tolist() == [1]
+    np.testing.assert_array_equal(model.jnt_range, [[held, math.nextafter(held, math.inf)]])
+
+
+def test_the_goal_is_the_last_row_of_a_query(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, free_cube())
+    (tmp_path / "via.query").write_text("1 0 0 0 0 0\n2 0 0 0 0 0\n3 0 0 0 0 0\n")
+    scene = env2mjcf.load(path, query=tmp_path / "via.query")
+    assert [scene.model.key(k).qpos[0] for k in ("start", "goal")] == [1, 3]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from real_scenes import real_scene, scene_names
-from scenes import write_scene
+from scenes import box_mesh, write_scene
 from truth import Truth
 
 import env2mjcf
@@ -22,12 +22,12 @@ from env2mjcf.cli.main import main
 
 pytest.importorskip("ompl", reason="no ompl: pip install 'env2mjcf[planning]'")
 
-from env2mjcf.planning import PLANNERS, Plan, plan, plan_through
+from env2mjcf.planning import PLANNERS, Plan, plan, plan_through, result
 from env2mjcf.planning import planner_space as validity
 from env2mjcf.planning.ompl_bridge import state_space
 from env2mjcf.planning.planner_space import PlanningSpace, Validity
 from env2mjcf.planning.planners import checked_planner
-from env2mjcf.planning.result import Progress
+from env2mjcf.planning.result import Progress, Timekeeper
 from env2mjcf.planning.segment import shortened
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -295,6 +295,51 @@ def test_thin_walls_are_not_passed_over(tmp_path: Path):
     assert found.solved
     assert_free_by_triangles(scene, found.path, 0.02)
     assert np.abs(found.path[:, 1]).max() > 3.4
+
+
+def test_a_bar_turns_where_the_boundary_leaves_room(tmp_path: Path):
+    """Steps are too long to see it leave a ball's edge on its way, and nothing is there that it could touch."""
+    text = "Boundary Sphere2D [0 0; 2]\nMultibodies\n1\nActive\n1\nbar.g Planar Rotational\nConnections\n0\n"
+    scene = env2mjcf.load(write_scene(tmp_path, text, bar=box_mesh(1, 0.1, 0.1)), engine="mujoco")
+    start, goal = np.array([1.2, 0, 1.6]), np.array([1.2, 0, -1.5])
+    found = plan(scene, start, goal, resolution=5.0, time=20)
+    assert_leads(scene, found, start, goal)
+    rows = np.concatenate([scene.space.interpolate(a, b, 400) for a, b in pairwise(found.path)])
+    # Each corner's distance from the middle, by algebra.
+    corners = np.array([[x, y] for x in (-1, 1) for y in (-0.1, 0.1)])
+    c, s = np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
+    x = rows[:, :1] + c * corners[:, 0] - s * corners[:, 1]
+    y = rows[:, 1:2] + s * corners[:, 0] + c * corners[:, 1]
+    # Looks are 0.1 apart: no corner is farther than half of that from where it was seen. Straight on, it comes to 2.2.
+    assert np.hypot(x, y).max() <= 2.05
+
+
+@pytest.mark.slow_but("RRTConnect")
+@pytest.mark.parametrize("planner", ["RRTConnect", "BatchEST"])
+def test_a_goal_that_is_whole_turns_away_is_reached_in_its_own_numbers(planner: str, room: Path):
+    scene = env2mjcf.load(room / "open.env", engine="mujoco")
+    start, goal = np.array([-2, 0, -7.0]), np.array([2, 0, 20.0])
+    found = plan(scene, start, goal, planner=planner, time=20, shorten=False)
+    assert_leads(scene, found, start, goal)
+
+
+def test_angles_of_circles_are_brought_within_half_a_turn(maze: env2mjcf.Scene):
+    space, angles = space_of(maze), np.array([0.1, -0.1, 3.0, -3.0])
+    for turns in (-2, 0, 1):
+        rows = np.column_stack([np.zeros((4, 2)), angles + 2 * np.pi * turns])
+        np.testing.assert_allclose(space.enforced(rows)[:, 2], angles, atol=1e-12)
+
+
+def test_parts_of_the_time_end_when_they_should(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(result.time, "perf_counter", lambda: now[0])
+    watch = Timekeeper(10.0, 1, None)
+    part, longer = watch.stop_within(3.0), watch.stop_within(30.0)
+    for seconds, expected in ((0.0, [False, False, False]), (2.9, [False, False, False]), (3.1, [False, True, False]),
+                              (9.9, [False, True, False]), (10.1, [True, True, True])):  # fmt: skip
+        now[0] = 100.0 + seconds
+        assert [watch.stop(), part(), longer()] == expected
+        assert watch.left == pytest.approx(10.0 - seconds)
 
 
 def test_short_cuts_keep_ends_and_never_lengthen(maze: env2mjcf.Scene):

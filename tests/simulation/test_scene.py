@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from extras import skip_without
 from scenes import box_mesh, free_cube, notched_block, write_scene
 
 import env2mjcf
@@ -90,6 +91,20 @@ def test_a_ball_bounds_the_farthest_vertex(tmp_path: Path) -> None:
     reach = np.sqrt(81 - 0.5) - 0.5
     assert scene.is_valid(at(-reach + 1e-9, 0, 0))
     assert not scene.is_valid(at(-reach - 1e-6, 0, 0))
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "exact"])
+def test_a_vertex_on_the_boundary_is_inside_on_every_side(tmp_path: Path, engine: str) -> None:
+    """The boundary is closed, and a place is known to a rounding of it: 1e-12 of 10 m."""
+    if engine == "exact":
+        skip_without("fast")
+    scene = env2mjcf.load(write_scene(tmp_path, free_cube("1 1 1 0 0 0")), engine=engine)
+    for axis in range(3):
+        for side in (-1, 1):
+            for beyond, inside in ((0.0, True), (5e-12, True), (5e-11, False)):
+                q = np.zeros(6)
+                q[axis] = side * (9.5 + beyond)
+                assert scene.is_valid(q) is inside, (axis, side, beyond)
 
 
 def test_contacts_tell_who_where_and_how_deep(cubes: env2mjcf.Scene) -> None:

@@ -8,12 +8,14 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from meshes import channel
 from real_scenes import real_scene
 from scenes import MODELS, box_mesh, free_cube, write_scene
 from simulations import fall, simulated, start, weight
 from truth import Truth
 
 import env2mjcf
+from env2mjcf.formats.meshes.byu import export_byu
 from env2mjcf.geometry.assembly import Part
 from env2mjcf.geometry.orientation import winding_numbers
 
@@ -51,6 +53,24 @@ def _depth(solid: Part, pose: np.ndarray, other: Part, other_pose: np.ndarray) -
         return 0.0
     surface = trimesh.Trimesh(a.vertices, a.faces, process=False)
     return float(np.abs(trimesh.proximity.closest_point_naive(surface, points)[1]).max())
+
+
+def test_mujoco_feels_bodies_wholly_inside_of_a_solid(tmp_path: Path) -> None:
+    """A small cube in the walls of a channel, each as thick as a sixth of its diagonal."""
+    solid = channel()
+    text = free_cube("channel.g 0 0 0 0 0 0")
+    cube, mesh = box_mesh(0.02, 0.02, 0.02), trimesh.Trimesh(solid.vertices, solid.faces)
+    scene = env2mjcf.load(write_scene(tmp_path, text, cube=cube, channel=export_byu(mesh)))
+    rng = np.random.default_rng(0)
+    points = rng.uniform(solid.vertices.min(axis=0), solid.vertices.max(axis=0), (1000, 3))
+    points = points[winding_numbers(points, solid.vertices, solid.faces) > 0.5]
+    assert len(points) > 500
+    felt = 0
+    for point in points - solid.vertices.mean(axis=0):
+        scene.set(np.array([*point, 0, 0, 0]))
+        mujoco.mj_forward(scene.model, scene.data)
+        felt += scene.data.ncon > 0
+    assert felt >= 0.94 * len(points)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -7,8 +7,8 @@ From top to bottom, in the current folder, where what they write stays:
   stands what it prints. A command that is to fail is written with `|| echo ...`.
 * ```` ```{code-block} LANGUAGE ```` with a `:caption:`: written into the file that the caption names.
 
-`...` stands for anything. ```` ```sh ```` and code blocks without caption are not run: a comment before them says why,
-`<!-- not run: reason -->`.
+`...` stands for anything. ```` ```sh ```` and code blocks without caption are not run, nor is Python that needs
+more than the extras: a comment before them says why, `<!-- not run: reason -->`.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def run_page(page: Path) -> None:
 
 def run_block(block: Block, module: types.ModuleType, page: Path) -> None:
     """Run one block."""
-    if block.language == "python":
+    if block.language == "python" and not block.reason:
         printed = run_python(block, module, page)
         if block.expected is not None:
             compare(block.line, block.expected, printed)

@@ -150,7 +150,12 @@ def assert_inside_and_covering(mesh: Mesh, *, pinned: int = 0) -> None:
     # A height about the pins' own: cells that deserve the name are a good deal thicker.
     cells = [p for p in pieces if height(shape, p) > 1.5 * PIN * a.diagonal]
     assert len(pieces) - len(cells) <= pinned
-    assert protrusion(shape, cells) <= 1e-9
+    # Polygons may be bent by a tenth of a pin's height, and cells be off by as much at their tops and sides.
+    loops = [(a.vertices[list(p.polygon.loop)], p.polygon.normal) for p in pieces]
+    bend = max(float(np.abs((loop - loop.mean(axis=0)) @ normal).max()) for loop, normal in loops)
+    assert bend <= 0.1 * PIN * a.diagonal
+    tolerance = max(1e-9 * a.diagonal, 2 * bend)
+    assert protrusion(shape, cells) * a.diagonal <= tolerance
     parts: dict[tuple[int, ...], list[ConvexPiece]] = {}
     for piece in pieces:
         parts.setdefault(piece.polygon.faces, []).append(piece)
@@ -159,7 +164,7 @@ def assert_inside_and_covering(mesh: Mesh, *, pinned: int = 0) -> None:
         corners = a.vertices[list(same[0].polygon.loop)]
         area += area_of(corners)
         if all(piece in cells for piece in same):
-            assert_outer_faces_are(same, corners, 1e-9 * a.diagonal)
+            assert_outer_faces_are(same, corners, tolerance)
     assert area == pytest.approx(a.area, rel=1e-9)
     if len(pieces) == len(shape.pieces):
         assert sorted(f for faces in parts for f in faces) == list(range(len(a.faces)))

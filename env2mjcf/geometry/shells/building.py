@@ -9,23 +9,22 @@ import numpy as np
 
 from ...limits import Work
 from ..analysis import Analysis
-from ..coplanar import Polygon, convex_polygons
-from ..pieces import SLENDEREST, ConvexPiece, frozen_piece, prisms, too_narrow
+from ..coplanar import Polygon, bend, convex_polygons
+from ..pieces import SLENDEREST, ConvexPiece, flatness, frozen_piece, prisms, too_narrow
 from ..topology import Ints, edges
-from .cells import Group, cell_corners, groups
+from .cells import Group, groups
+from .corners import cell_corners
 from .fitting import Surroundings, fit
+from .lips import lipped
 from .pairing import doubtful_polygons, pair_sides
 from .splitting import split_thin
-
-THICKEST = 0.02
-"""Greatest height of a cell in units of the mesh's diagonal: thicker ones cost time and gain nothing."""
 
 _THINNEST = 5e-6
 """Least height of a cell in units of the mesh's diagonal; below it a thin prism stands for the polygon."""
 
 _EXACT = 2e-10
-"""What counts as nothing, in units of the mesh's diagonal: bent polygons and grazing triangles, two of each at worst,
-must not add up to 1e-9."""
+"""What counts as nothing, in units of the mesh's diagonal, where no polygon is bent by more: bent polygons and grazing
+triangles, two of each at worst, must not add up to 1e-9."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +66,8 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     vertices, chosen = analysis.vertices, analysis.faces[faces]
     nothing = _EXACT * analysis.diagonal
     table = edges(chosen)
-    polygons = convex_polygons(vertices, chosen, nothing, table)
+    polygons = convex_polygons(vertices, chosen, max(nothing, flatness(analysis.diagonal, thickness)), table)
+    nothing = max(nothing, bend(vertices, polygons))
     normals = np.empty((len(chosen), 3))
     for polygon in polygons:
         normals[list(polygon.faces)] = polygon.normal
@@ -78,7 +78,7 @@ def shells(analysis: Analysis, faces: Ints, thickness: float, work: Work | None 
     of_polygon = solid[faces[[p.faces[0] for p in polygons]]]
     around = Surroundings(vertices[analysis.faces], solid, of_polygon, nothing, work)
     found: list[tuple[_Cell, ...]] = [()] * len(polygons)
-    for group in groups(vertices, chosen, polygons, sides.slopes, THICKEST * analysis.diagonal):
+    for group in groups(vertices, chosen, polygons, sides.slopes, sides.lips, analysis.diagonal):
         for number, cells in _fitted(group, around, polygons, analysis, thickness):
             found[number] = cells
     pieces = [[cell.piece for cell in cells] for cells in found]
@@ -116,16 +116,16 @@ def _fitted(
     """Yield the cells under each polygon of a group for which there is room; parts after wholes."""
     wanted = group.slopes.copy()
     fit(group, around)
-    for row, cell in _cells(group, polygons, analysis, thickness):
+    for row, cell in _cells(group, around, polygons, analysis, thickness):
         yield int(group.members[row]), (cell,)
-    for row, parts in split_thin(group, wanted, around, THICKEST * analysis.diagonal):
-        cells = [cell for part in parts for _, cell in _cells(part, polygons, analysis, thickness)]
+    for row, parts in split_thin(group, wanted, around, analysis.diagonal):
+        cells = [cell for part in parts for _, cell in _cells(part, around, polygons, analysis, thickness)]
         if len(cells) == len(parts):
             yield int(group.members[row]), tuple(cells)
 
 
 def _cells(
-    group: Group, polygons: tuple[Polygon, ...], analysis: Analysis, thickness: float
+    group: Group, around: Surroundings, polygons: tuple[Polygon, ...], analysis: Analysis, thickness: float
 ) -> Iterator[tuple[int, _Cell]]:
     """Yield row and cell of those of a group that MuJoCo can hold."""
     corners = cell_corners(group, analysis.tolerance)
@@ -134,8 +134,11 @@ def _cells(
     good = (
         (corners.depths >= least) & (corners.depths > thickness) & ~too_narrow(group.corners, group.normals, thickness)
     )
-    for row in np.flatnonzero(good).tolist():
-        points = corners.points[row][corners.used[row]]
+    rows = np.flatnonzero(good)
+    whole = {row: (corners.points[row][corners.used[row]], float(corners.volumes[row])) for row in rows.tolist()}
+    for row, points, volume in lipped(group, rows, around, analysis.diagonal, analysis.tolerance):
+        whole[row] = points, volume
+    for row, (points, volume) in whole.items():
         mean = points.mean(axis=0)
         piece = frozen_piece(points - mean, group.centers[row] + mean, polygons[group.members[row]])
-        yield row, _Cell(piece, float(corners.depths[row]), float(corners.volumes[row]), bool(group.tilted[row]))
+        yield row, _Cell(piece, float(corners.depths[row]), volume, bool(group.tilted[row]))

@@ -5,7 +5,7 @@ Boxes tell which triangles come near which cells; those are cut by the planes of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,15 +71,16 @@ def _clipped(triangles: Floats, planes: Floats) -> tuple[Floats, Ints]:
     """
     points, count = triangles, np.full(len(triangles), 3, dtype=np.int64)
     for i in range(planes.shape[1]):
-        points, count = _cut(points, count, planes[:, i])
+        height = np.einsum("nkj,nj->nk", points, planes[:, i, :3]) + planes[:, i, 3:]
+        used = np.arange(points.shape[1]) < count[:, None]
+        if (used & (height < 0)).any():
+            points, count = _cut(points, count, height, used)
     return points, count
 
 
-def _cut(points: Floats, count: Ints, plane: Floats) -> tuple[Floats, Ints]:
+def _cut(points: Floats, count: Ints, height: Floats, used: Bools) -> tuple[Floats, Ints]:
     size = points.shape[1]
     slot = np.arange(size)
-    used = slot < count[:, None]
-    height = np.einsum("nkj,nj->nk", points, plane[:, :3]) + plane[:, 3:]
     after = np.where(slot + 1 < count[:, None], slot + 1, 0)
     beyond = np.take_along_axis(height, after, axis=1)
     inside = used & (height >= 0)
@@ -117,6 +118,9 @@ class Surroundings:
 def fit(group: Group, around: Surroundings) -> None:
     """Lower cells, or tilt their sides, until no triangle is left in them.
 
+    Sides are tilted for the sake of a shallow cell only, because tilted ones catch bodies: where a face slides, those
+    of the faces next to it stand on the ground with an edge. Deeper cells keep the sides that they have.
+
     A cell has its outer face in common with the solid, so that its points near there are inside, and it is convex: a
     path to any other of its points would leave the solid through a face within the cell. So a cell that no face
     reaches lies in the solid.
@@ -125,26 +129,46 @@ def fit(group: Group, around: Surroundings) -> None:
         group: Its slopes, heights and `tilted` are changed.
         around: The surface.
     """
-    cell, other = _may_meet(group, around)
+    caps = group.height
+    group.height = np.minimum(caps, group.shallow)
+    _make_room(group, around, _give_way)
+    deep = np.flatnonzero((group.height >= group.shallow) & (caps > group.shallow))
+    cells = group.some(deep)
+    cells.height = caps[deep]
+    _make_room(cells, around, _end_above)
+    group.height[deep] = np.maximum(cells.height, group.shallow)
+
+
+def _make_room(group: Group, around: Surroundings, change: Callable[[Group, Ints, Floats, Floats], None]) -> None:
+    """Change cells until no triangle is left in them; those of which one never leaves get the height 0."""
+    cell, other = may_meet(group, around)
     for _ in range(_ROUNDS):
         if len(cell) == 0:
             return
-        found = [_extent(group, *block) for block in _clipped_pieces(group, around, cell, other)]
+        found = [_extent(group, *block) for block in within(group, around, cell, other)]
         cell, other, start, ratio = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if len(cell):
-            _give_way(group, cell, start, ratio)
+            change(group, cell, start, ratio)
     group.height[np.unique(cell)] = 0.0
+
+
+def reached(group: Group, around: Surroundings) -> Bools:
+    """Tell into which cells any triangle reaches, (g,)."""
+    out = np.zeros(len(group), dtype=np.bool_)
+    for cell, *_ in within(group, around, *may_meet(group, around)):
+        out[cell] = True
+    return out
 
 
 def corners_within(group: Group, around: Surroundings) -> Floats:
     """Return the corners (n, 3), about the cell's centre, of all that reaches into a group of one cell."""
-    blocks = _clipped_pieces(group, around, *_may_meet(group, around))
+    blocks = within(group, around, *may_meet(group, around))
     return np.concatenate(
         [np.zeros((0, 3)), *(points[np.arange(points.shape[1]) < count[:, None]] for _, _, points, count in blocks)]
     )
 
 
-def _may_meet(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
+def may_meet(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
     """Return the pairs of cells and triangles that may meet and matter."""
     low, high = group.boxes()
     cell, other = _overlapping(low, high, around.triangles.min(axis=1), around.triangles.max(axis=1), around.work)
@@ -153,15 +177,17 @@ def _may_meet(group: Group, around: Surroundings) -> tuple[Ints, Ints]:
     return cell[matters], other[matters]
 
 
-def _clipped_pieces(
-    group: Group, around: Surroundings, cell: Ints, other: Ints
-) -> Iterator[tuple[Ints, Ints, Floats, Ints]]:
+def within(group: Group, around: Surroundings, cell: Ints, other: Ints) -> Iterator[tuple[Ints, Ints, Floats, Ints]]:
     """Yield blocks of cells, triangles, and what of each triangle lies in the cell: corners (n, k, 3), counts (n,)."""
-    step = max(1, _NUMBERS // (3 * (group.corners.shape[1] + 2)))
+    sides = group.corners.shape[1] * (1 if group.bend is None else 2)
+    step = max(1, _NUMBERS // (3 * (sides + 2)))
     for i in range(0, len(cell), step):
         c, t = cell[i : i + step], other[i : i + step]
         around.work.spend(COSTLY * len(c))
         local = around.triangles[t] - group.centers[c, None]
+        # Most of what is near a cell is the surface around its polygon.
+        below = np.flatnonzero(np.einsum("nkj,nj->nk", local, group.normals[c]).min(axis=1) < -around.margin)
+        c, t, local = c[below], t[below], local[below]
         planes = group.planes(c, around.margin)
         chosen = np.flatnonzero(~_behind_a_plane(local, planes))
         c, t, local, planes = c[chosen], t[chosen], local[chosen], planes[chosen]
@@ -186,6 +212,11 @@ def _extent(group: Group, c: Ints, t: Ints, points: Floats, count: Ints) -> tupl
 def _behind_a_plane(local: Floats, planes: Floats) -> Bools:
     heights = np.einsum("ncj,npj->npc", local, planes[:, :, :3]) + planes[:, :, 3:]
     return np.asarray((heights.max(axis=2) <= 0).any(axis=1))
+
+
+def _end_above(group: Group, cell: Ints, start: Floats, ratio: Floats) -> None:
+    """Let each cell that has triangles in it end halfway above them."""
+    np.minimum.at(group.height, cell, start / 2)
 
 
 def _give_way(group: Group, cell: Ints, start: Floats, ratio: Floats) -> None:

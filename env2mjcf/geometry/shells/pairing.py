@@ -20,6 +20,13 @@ from ..topology import Edges, Floats, Ints, connected, facing
 # far beyond the polygon, and cost time.
 _BLUNT = 0.9 * np.pi
 
+_LEAN = np.radians(3.0)
+"""Angle between a face and a lip of its cell. MuJoCo takes faces within 5.13 degrees for parallel (`mjFACE_TOL`), and
+then uses the normal of the second geom's face."""
+
+FLAT = -1 / np.tan(_LEAN)
+"""Slope of such a lip."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sides:
@@ -27,11 +34,13 @@ class Sides:
 
     Attributes:
         slopes: (m, 3) how much the cell of the face recedes per unit of depth at each edge; negative where it grows.
+        lips: (m, 3) the same for its lip there, if the edge is nearly flat; else infinite.
         links: (p, 2) pairs of faces that bound the same wedge of the solid at some edge.
         folded: Whether faces lie upon each other at some edge.
     """
 
     slopes: Floats
+    lips: Floats
     links: Ints
     folded: bool
 
@@ -43,6 +52,9 @@ def pair_sides(vertices: Floats, faces: Ints, table: Edges, normals: Floats, wor
     the wedge between the two, and the partner's cell does too. Bisector planes between them would make blades of the
     cells: a body that lies on one face would touch with the blades of all others, and several contacts of a blade get
     the normal of its own side, not of the face. At blunt, flat, reflex and open edges the side goes straight down.
+
+    A body that slides over an upright side gets caught. So where two faces fold by little, either way, the side begins
+    with a lip, which reaches under the neighbour, in its plane or three degrees below the face, whichever is lower.
 
     Where more than two faces meet, the partner of a face is the one that `facing` finds.
 
@@ -61,8 +73,11 @@ def pair_sides(vertices: Floats, faces: Ints, table: Edges, normals: Floats, wor
     slopes = np.zeros(faces.size)
     convex = angle < _BLUNT
     slopes[here[convex]] = 1 / np.tan(angle[convex])
+    lips = np.full(faces.size, np.inf)
+    shallow = ~convex & (angle <= 2 * np.pi - _BLUNT)
+    lips[here[shallow]] = -1 / np.tan(np.maximum(np.pi - angle[shallow], _LEAN))
     links = np.stack([here // 3, there // 3], axis=1)
-    return Sides(slopes.reshape(-1, 3), links, folded)
+    return Sides(slopes.reshape(-1, 3), lips.reshape(-1, 3), links, folded)
 
 
 def doubtful_polygons(

@@ -10,9 +10,10 @@ import numpy as np
 from ..topology import Bools, Floats
 from .cells import Group, group_of
 from .fitting import Surroundings, corners_within, fit
+from .pairing import FLAT
 
 THIN = 0.25
-"""Depth in units of the greatest one below which a cell is worth cutting."""
+"""Depth in units of `Group.shallow` below which a cell is worth cutting."""
 
 _SPOT = 8.0
 """What counts as a thin spot: where other faces are less deep than this many times the cell."""
@@ -27,70 +28,69 @@ _CUTS = 4
 _ROUNDS = 3
 
 
-def split_thin(group: Group, wanted: Floats, around: Surroundings, cap: float) -> list[tuple[int, list[Group]]]:
+def split_thin(group: Group, wanted: Floats, around: Surroundings, diagonal: float) -> list[tuple[int, list[Group]]]:
     """Cut the polygons of thin cells.
 
     Args:
         group: Fitted cells.
         wanted: (g, k) how their sides leaned before.
         around: What may reach into cells.
-        cap: Greatest height of a cell.
+        diagonal: Of the mesh.
 
     Returns:
         Row and fitted parts, groups of one, of each polygon most of which becomes at least twice as thick.
     """
     out: list[tuple[int, list[Group]]] = []
-    for row in np.flatnonzero(_worth_cutting(group, cap)).tolist():
+    for row in np.flatnonzero(_worth_cutting(group)).tolist():
         before = float(group.depth()[row])
         corners = group.corners[row] + group.centers[row]
-        parts = list(_parts(group, row, corners, wanted[row], around, cap, _ROUNDS))
-        areas = np.array([_flat(part, 0, part.slopes[0]).area for part in parts])
+        sides = np.stack([wanted[row], group.lips[row]], axis=1)
+        parts = list(_parts(group, row, corners, sides, around, diagonal, _ROUNDS))
+        areas = np.array([_flat(part, 0, sides).area for part in parts])
         better = np.array([part.depth()[0] >= 2 * before for part in parts])
         if areas[better].sum() > areas.sum() / 2:
             out.append((row, parts))
     return out
 
 
-def _worth_cutting(group: Group, cap: float) -> Bools:
+def _worth_cutting(group: Group) -> Bools:
     """Tell which cells are thin, and wide enough for parts that are wider than deep, (g,)."""
-    across = np.einsum("gej,gvj->gev", group.inward, group.corners)
-    width = np.ptp(across, axis=2).min(axis=1)
     depth = group.depth()
-    return np.asarray((depth > 0) & (depth < THIN * cap) & (width > 2 * cap))
+    return np.asarray((depth > 0) & (depth < THIN * group.shallow) & (group.width > 2 * group.shallow))
 
 
 def _parts(
-    group: Group, row: int, corners: Floats, slopes: Floats, around: Surroundings, cap: float, rounds: int
+    group: Group, row: int, corners: Floats, sides: Floats, around: Surroundings, diagonal: float, rounds: int
 ) -> Iterator[Group]:
     """Fit a cell under a part of a polygon, (k, 3) in the mesh's frame; where it is thin, cut the part further."""
 
-    def cell(height: float) -> Group:
-        return group_of(group.members[row : row + 1], corners[None], group.normals[row : row + 1], slopes[None], height)
+    def cell() -> Group:
+        members, normals = group.members[row : row + 1], group.normals[row : row + 1]
+        return group_of(members, corners[None], normals, sides[None, :, 0].copy(), sides[None, :, 1], diagonal)
 
-    fitted = cell(cap)
-    fitted.slopes = fitted.slopes.copy()
+    fitted = cell()
     fit(fitted, around)
-    if rounds == 0 or not _worth_cutting(fitted, cap)[0]:
+    if rounds == 0 or not _worth_cutting(fitted)[0]:
         yield fitted
         return
-    part = _flat(fitted, 0, slopes)
-    spot = corners_within(cell(min(cap, _SPOT * float(fitted.depth()[0]))), around)
-    free, rest = _cut_free(part, part.projected(spot), cap)
+    part, low = _flat(fitted, 0, sides), cell()
+    low.height = np.minimum(low.shallow, _SPOT * fitted.depth())
+    free, rest = _cut_free(part, part.projected(corners_within(low, around)), low.shallow)
     if not free:
         yield fitted
         return
     for piece in (*free, rest):
         lifted = piece.points @ part.axes + fitted.centers[0]
-        yield from _parts(group, row, lifted, piece.slopes, around, cap, rounds - 1)
+        yield from _parts(group, row, lifted, piece.sides, around, diagonal, rounds - 1)
 
 
-def _flat(group: Group, row: int, slopes: Floats) -> FlatPolygon:
+def _flat(group: Group, row: int, sides: Floats) -> FlatPolygon:
     inward, normal = group.inward[row, 0], group.normals[row]
     axes = np.stack([np.cross(inward, normal), inward])
-    return FlatPolygon(group.corners[row] @ axes.T, slopes, axes)
+    return FlatPolygon(group.corners[row] @ axes.T, sides, axes)
 
 
-def _cut_free(part: FlatPolygon, spot: Floats, cap: float) -> tuple[list[FlatPolygon], FlatPolygon]:
+def _cut_free(part: FlatPolygon, spot: Floats, narrow: float) -> tuple[list[FlatPolygon], FlatPolygon]:
     """Cut off what lies beside a spot (n, 2), along its outline or the polygon's: the largest parts first."""
     free: list[FlatPolygon] = []
     least = _LEAST_SHARE * part.area
@@ -99,7 +99,7 @@ def _cut_free(part: FlatPolygon, spot: Floats, cap: float) -> tuple[list[FlatPol
         for normal in np.concatenate([hull_normals(spot), part.normals, -part.normals]):
             offset = float((spot @ normal).max(initial=-np.inf))
             beside = part.beyond(normal, offset)
-            if beside is not None and beside.area > largest and float(np.ptp(beside.points @ normal)) > cap:
+            if beside is not None and beside.area > largest and float(np.ptp(beside.points @ normal)) > narrow:
                 best, border, largest = beside, (-normal, -offset), beside.area
         rest = part.beyond(*border)
         if best is None or rest is None:
@@ -115,12 +115,12 @@ class FlatPolygon:
 
     Attributes:
         points: (k, 2).
-        slopes: (k,) how the cell's side recedes at the edge that begins at each corner.
+        sides: (k, 2) how the cell's side, and its lip, recede at the edge that begins at each corner.
         axes: (2, 3) the plane's axes in the mesh's frame.
     """
 
     points: Floats
-    slopes: Floats
+    sides: Floats
     axes: Floats
 
     @property
@@ -139,24 +139,25 @@ class FlatPolygon:
         return points @ self.axes.T
 
     def beyond(self, normal: Floats, offset: float) -> FlatPolygon | None:
-        """Return the part where `x . normal >= offset`, if that is more than an edge; the cut goes straight down."""
+        """Return the part where `x . normal >= offset`, if that is more than an edge; cut straight down, with a lip."""
         height = self.points @ normal - offset
         height[np.abs(height) <= _ON * float(np.ptp(self.points, axis=0).max())] = 0.0
         if height.max() <= 0:
             return None
         points: list[Floats] = []
-        slopes: list[float] = []
-        for i, slope in enumerate(self.slopes.tolist()):
+        sides: list[Floats] = []
+        cut = np.array([0.0, FLAT])
+        for i, side in enumerate(self.sides):
             j = (i + 1) % len(height)
             if height[i] >= 0:
                 points.append(self.points[i])
                 # What leaves at a corner on the cut gives way to the cut.
-                slopes.append(0.0 if height[i] == 0 and height[j] < 0 else slope)
+                sides.append(cut if height[i] == 0 and height[j] < 0 else side)
             if height[i] * height[j] < 0:
                 share = height[i] / (height[i] - height[j])
                 points.append(self.points[i] + share * (self.points[j] - self.points[i]))
-                slopes.append(0.0 if height[i] > 0 else slope)
-        return FlatPolygon(np.array(points), np.array(slopes), self.axes)
+                sides.append(cut if height[i] > 0 else side)
+        return FlatPolygon(np.array(points), np.array(sides), self.axes)
 
 
 def hull_normals(points: Floats) -> Floats:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from scenes import MODELS
+from scenes import MODELS, free_cube, write_scene
 
 import env2mjcf
 from env2mjcf.contact.exact.motions import Motions
 from env2mjcf.contact.exact.tables import BLOCK, LANES
 from env2mjcf.contact.exact.wide_tree import box_tree, depth, wide_tree
+from env2mjcf.formats.meshes.byu import export_byu
 from env2mjcf.geometry.distance import nearest
 from env2mjcf.geometry.orientation import winding_numbers
 from env2mjcf.transforms import rotation_matrix, transform
@@ -95,6 +97,28 @@ def test_distances_of_triangles_are_those_of_the_library_of_arrays() -> None:
             assert triangle_gap(triangle, row) <= expected.min() ** 2 * (1 + 1e-12)
 
 
+@pytest.mark.parametrize("angle", [1.0, 5e-3, 1e-4, 1e-6])
+def test_edges_that_are_nearly_parallel_are_nearest_where_they_cross(angle: float) -> None:
+    """One edge passes at a height over the middle of another one; what else the triangles have lies farther off."""
+    height = 0.1 * angle
+    a = np.array([[-1, 0, 0], [1, 0, 0], [0.3, 0.2, -1]])
+    c, s = np.cos(angle), np.sin(angle)
+    b = np.array([[-c, -s, height], [c, s, height], [0.1, -0.3, 1 + height]])
+    for first, second in ((a, b), (b, a)):
+        for turn in range(3):
+            row, triangle = block_of(np.tile(np.roll(second, turn, axis=0), (BLOCK, 1, 1))), tuple(first.ravel())
+            assert np.sqrt(triangle_distance(triangle, row)) == pytest.approx(height, rel=1e-6)
+
+
+def test_a_triangle_without_area_is_as_far_as_its_edges() -> None:
+    """It lies on a line beside a corner of the other one, and its plane is none."""
+    line = np.array([[0, 0, 2.0], [1, 1, 2], [3, 3, 2]])
+    other = np.array([[1, 1, 0], [5, 1, 0], [1, 5, -1.0]])
+    for a, b in ((line, other), (other, line)):
+        row = block_of(np.tile(b, (BLOCK, 1, 1)))
+        assert np.sqrt(triangle_distance(tuple(a.ravel()), row)) == pytest.approx(2.0)
+
+
 def test_a_box_meets_the_triangles_that_its_hull_meets() -> None:
     """Against python-fcl, whose box is solid too."""
     fcl = pytest.importorskip("fcl", reason="no python-fcl to compare with")
@@ -166,6 +190,17 @@ def test_trees_hold_every_triangle_once_in_boxes_around_it() -> None:
         assert depth(tree.child) <= 2 + 2 * np.log(len(triangles)) / np.log(LANES)
 
 
+def test_trees_far_away_hold_their_triangles_too() -> None:
+    """Middles and half sizes of boxes are rounded by as much as the place is."""
+    triangles = np.asarray(trimesh.creation.icosphere(2).triangles) + np.array([1e6, -3e6, 2e6])
+    tree = wide_tree(triangles)
+    for node, lane in np.argwhere(tree.child < 0):
+        corners = triangles[tree.faces[~tree.child[node, lane]]].reshape(-1, 3)
+        center, half = tree.boxes[node, :3, lane], tree.boxes[node, 3:, lane]
+        assert (corners <= center + half).all()
+        assert (corners >= center - half).all()
+
+
 def test_trees_over_equal_boxes_are_not_deep() -> None:
     low = np.zeros((4096, 3))
     _, child = box_tree(low, low + 1)
@@ -221,3 +256,48 @@ def test_rays_count_as_winding_numbers_do() -> None:
     stack = np.zeros(4096, dtype=np.int64)
     assert [holds(tables, shape, *point, stack) for point in points] == expected.tolist()
     assert 200 < expected.sum() < 2800
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [0.4, 1.5])
+@pytest.mark.parametrize("corners", [5, 7, 9, 12])
+def test_points_of_a_star_are_inside_as_algebra_says(tmp_path: Path, corners: int, height: float) -> None:
+    """A prism over a star, which is not convex: leaves of its tree are filled up with a triangle again.
+
+    Rays go along the shortest side of the box, through the star or along its plane.
+    """
+    angles = np.pi * np.arange(2 * corners) / corners
+    radii = np.where(np.arange(2 * corners) % 2, 0.5, 1.0)
+    rim = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    n = len(rim)
+    vertices = [[*p, z] for z in (-height, height) for p in [*rim, np.zeros(2)]]
+    faces = []
+    for i in range(n):
+        j, top = (i + 1) % n, n + 1
+        faces += [[j, i, n], [top + i, top + j, top + n], [i, j, top + j], [i, top + j, top + i]]
+    # One triangle becomes three, so that their number is no multiple of a leaf's.
+    a, b, c = faces.pop(1)
+    vertices.append(np.mean([vertices[k] for k in (a, b, c)], axis=0).tolist())
+    faces += [[a, b, len(vertices) - 1], [b, c, len(vertices) - 1], [c, a, len(vertices) - 1]]
+    assert len(faces) % BLOCK == 2
+    star = trimesh.Trimesh(vertices, faces, process=False)
+    path = write_scene(tmp_path, free_cube("star.g 0 0 0 0 0 0"), star=export_byu(star))
+    scene = env2mjcf.load(path)
+    tables = opened(*scene._solver._chosen("exact")._tables)
+    frame, shape = tables.poses[0].reshape(3, 4), int(tables.obstacles[0, 0])
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-1, 1, (200, 3)) * [1.05, 1.05, 1.2 * height]
+    # And such that their rays pass every triangle.
+    passed = np.repeat(np.array(vertices)[faces].mean(axis=1), 20, axis=0)
+    below = rng.uniform(0.01, 2, (len(passed), 1)) * (frame[:, :3] @ [_LEAN_X, _LEAN_Y, 1.0])
+    points = np.concatenate([points, passed - below])
+    # Between two corners of the rim, a point is inside if it is on the middle's side of the line through them.
+    sector = np.floor(np.mod(np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi) / (np.pi / corners)).astype(int)
+    p, q = rim[sector], rim[(sector + 1) % n]
+    side = np.linalg.det(np.stack([q - p, points[:, :2] - p], axis=1))
+    expected = (side > 0) & (np.abs(points[:, 2]) < height)
+    stack = np.zeros(4096, dtype=np.int64)
+    # Meshes are placed by the mean of their vertices.
+    local = (points - np.mean(vertices, axis=0) - frame[:, 3]) @ frame[:, :3]
+    assert [holds(tables, shape, *point, stack) for point in local] == expected.tolist()
+    assert 0.1 < expected.mean() < 0.7

@@ -123,3 +123,11 @@ def test_size_does_not_matter(scale: float) -> None:
     outline = np.array(DART) * 2.0 - 3.0
     points = np.column_stack([outline, np.zeros(len(outline))]) * scale
     assert {frozenset(f) for f in cut(points)[0].tolist()} == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
+
+
+def test_the_place_does_not_matter() -> None:
+    """Corners that doubles hold to the digit, a billion times as far away as they are apart."""
+    points = np.column_stack([8.0 * np.array(DART), np.zeros(len(DART))]) + 2.0 ** np.array([34, 35, 33])
+    faces, crossing = cut(points)
+    assert {frozenset(f) for f in faces.tolist()} == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
+    assert crossing == []

@@ -14,7 +14,7 @@ def ellipse(corners: int, seed: int) -> FlatPolygon:
     rng = np.random.default_rng(seed)
     angle = np.sort(rng.uniform(0, 2 * np.pi, corners))
     points = np.column_stack([3 * np.cos(angle), np.sin(angle)]) + rng.normal(size=2)
-    return FlatPolygon(points, np.arange(1.0, corners + 1), AXES)
+    return FlatPolygon(points, np.arange(1.0, corners + 1)[:, None] * (1, -1), AXES)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -33,10 +33,13 @@ def test_the_two_sides_of_a_cut_make_up_the_polygon(seed: int) -> None:
     assert (above.points @ normal >= offset - 1e-8).all()
     assert (below.points @ normal <= offset + 1e-8).all()
     for part in (above, below):
-        # One edge is the cut; the others lie on edges of the polygon, whose slopes they have.
-        assert (part.slopes == 0).sum() == 1
-        for start, end, slope in zip(part.points, np.roll(part.points, -1, axis=0), part.slopes, strict=True):
+        # One edge is the cut, straight with a lip; the others lie on edges of the polygon, whose slopes they have.
+        slopes, lips = part.sides.T
+        assert (slopes == 0).sum() == 1
+        assert lips[slopes == 0] == pytest.approx(-1 / np.tan(np.radians(3)))
+        for start, end, slope, lip in zip(part.points, np.roll(part.points, -1, axis=0), slopes, lips, strict=True):
             if slope:
+                assert lip == -slope
                 a, b = polygon.points[int(slope) - 1], polygon.points[int(slope) % len(polygon.points)]
                 for p in (start, end):
                     assert abs((b - a)[0] * (p - a)[1] - (b - a)[1] * (p - a)[0]) < 1e-9
@@ -49,7 +52,7 @@ def test_nothing_lies_beyond_a_cut_along_an_edge() -> None:
         whole = polygon.beyond(-normal, float(-normal @ point))
         assert whole is not None
         assert whole.area == pytest.approx(polygon.area)
-        assert sorted(whole.slopes) == sorted(polygon.slopes)
+        np.testing.assert_array_equal(np.sort(whole.sides, axis=0), np.sort(polygon.sides, axis=0))
 
 
 def test_hull_normals_bound_the_points_and_touch_them() -> None:

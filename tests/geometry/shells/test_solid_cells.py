@@ -37,6 +37,8 @@ from env2mjcf.geometry.repair import repaired
 from env2mjcf.geometry.shapes import CollisionShape, collision_shape
 from env2mjcf.geometry.shells import shells
 
+LIP = 1e-4  # of the diagonal deep
+
 
 @pytest.mark.parametrize("name", MESHES)
 def test_cells_stay_inside_and_cover_the_surface(name: str) -> None:
@@ -98,11 +100,13 @@ def volumes_by_normal(mesh: Mesh) -> dict[tuple[float, ...], list[float]]:
 
 
 def test_cells_go_straight_down_at_right_and_reflex_edges() -> None:
-    """Slabs, which overlap at the corners of the channel as its walls do."""
+    """Slabs, which overlap at the corners of the channel as its walls do.
+
+    Below rims and pit they are as deep as those are wide, under the bottom as deep as halfway to the pit.
+    """
     volumes = volumes_by_normal(channel())
-    h = 0.02 * np.sqrt(16 + 9 + 9)
-    assert volumes[0, 0, -1] == [pytest.approx(12 * h, rel=1e-5)]
-    assert any(v == pytest.approx(4 * h, rel=1e-5) for v in volumes[0, 0, 1])
+    assert volumes[0, 0, -1] == [pytest.approx(12 * 0.5, rel=1e-5)]
+    assert volumes[0, 0, 1] == pytest.approx([4 * 1.0] * 3, rel=1e-5)
 
 
 @pytest.mark.parametrize("width", [4, 2], ids=["acute", "obtuse"])
@@ -115,18 +119,21 @@ def test_cells_fill_the_wedges_at_convex_edges(width: float) -> None:
     cap = np.array([[0, i, i + 1] for i in range(1, n - 1)])
     sides = [f for i in range(n) for j in [(i + 1) % n] for f in ([i, j, j + n], [i, j + n, i + n])]
     mesh = Mesh.from_arrays("trough", corners, np.vstack([cap[:, ::-1], cap + n, sides]))
-    h = 0.02 * mesh.diagonal
+    h = 0.9 / 2  # halfway to the dent in the top
     assert volumes_by_normal(mesh)[0, 0, -1] == [pytest.approx(5 * (width * h - lean * h**2 / 2), rel=1e-5)]
 
 
-def test_cells_go_straight_down_at_blunt_edges() -> None:
-    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab."""
+def test_cells_go_straight_down_at_blunt_edges_but_for_a_lip() -> None:
+    """A drum of 24 sides, 165 degrees to each other, with a groove around: each side is a slab as deep as wide.
+
+    Lips in the planes of the neighbours widen it at both edges, and it narrows again towards the bottom.
+    """
     outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.0), (0.8, 1.4), (1.0, 1.4), (1.0, 2.4)]  # radius, height
     drum = trimesh.creation.revolve([(0, 0), *outline, (0, 2.4)], sections=24)
     volumes = volumes_by_normal(of_trimesh("drum", drum))
-    h, side = 0.02 * np.linalg.norm(np.ptp(drum.vertices, axis=0)), 2 * np.sin(np.pi / 24)
+    side, lip = 2 * np.sin(np.pi / 24), LIP * np.linalg.norm(np.ptp(drum.vertices, axis=0)) / np.tan(np.pi / 12)
     sides = sorted(v for normal, found in volumes.items() if normal[2] == 0 for v in found)
-    assert sides[24:] == pytest.approx([side * h] * 48, rel=1e-4)  # the least are those in the groove
+    assert sides[24:] == pytest.approx([(side + lip) * side] * 48, rel=1e-5)  # the least are those in the groove
 
 
 @pytest.mark.parametrize("name", ["channel", "torus", "spiky", "star", "thin bottom"])
@@ -137,9 +144,9 @@ def test_the_volume_of_the_cells_is_that_of_their_hulls(name: str) -> None:
     assert result.volume == pytest.approx(sum(hull_volume(p.vertices) for p in cells), rel=1e-4)
 
 
-def test_cells_are_as_thick_as_the_cap_where_there_is_room() -> None:
+def test_cells_meet_in_the_middle_of_walls() -> None:
     result = shelled(channel())
-    assert result.thinnest == pytest.approx(0.02 * np.sqrt(34), rel=1e-9)
+    assert result.thinnest == pytest.approx(0.5, rel=1e-9)
     assert (result.pinned, result.tilted) == (0, 0)
 
 
@@ -191,6 +198,79 @@ def test_where_there_is_no_room_a_thin_prism_stands_and_is_counted() -> None:
     assert "4 thin prisms where there is no room" in shape.note
 
 
+def reach_beyond(shape: CollisionShape, piece: ConvexPiece, edge: np.ndarray) -> tuple[float, float]:
+    """How far a cell reaches beyond an edge of its face, (2, 3) counter-clockwise; how deep those corners lie."""
+    along = edge[1] - edge[0]
+    outward = np.cross(along, piece.polygon.normal) / np.linalg.norm(along)
+    points = piece.vertices + piece.center - edge[0]
+    beyond = points @ outward
+    far = beyond > beyond.max() - 1e-9 * shape.analysis.diagonal
+    return float(beyond.max()), float(-(points[far] @ piece.polygon.normal).mean())
+
+
+def assert_lip(shape: CollisionShape, piece: ConvexPiece, edge: np.ndarray, degrees: float = 3.0) -> None:
+    reach, depth = reach_beyond(shape, piece, edge)
+    assert depth == pytest.approx(LIP * shape.analysis.diagonal, rel=1e-6)
+    assert reach == pytest.approx(depth / np.tan(np.radians(degrees)), rel=1e-6)
+
+
+def corner_block() -> Mesh:
+    """Three unit cubes around a corner: their top and bottom are each two polygons or three."""
+    filled = np.ones((2, 2, 1), dtype=bool)
+    filled[1, 1, 0] = False
+    return of_trimesh("corner", voxels([np.arange(3.0), np.arange(3.0), np.arange(2.0)], filled))
+
+
+@pytest.mark.parametrize("turn", [0, 4])
+def test_cells_reach_under_each_other_at_flat_seams_and_nowhere_else(turn: int) -> None:
+    """By the angle of three degrees, beyond which MuJoCo would not take the lip's face and the seam's for parallel.
+
+    The larger of two faces at a seam ends at an outer wall further on, so that a lip of its cell would leave the solid.
+    """
+    mesh = moved(corner_block(), rotation(turn) if turn else np.eye(3))
+    assert_inside_and_covering(mesh)
+    shape, pieces = lined(mesh)
+    of_edge: dict[tuple[int, int], ConvexPiece] = {}
+    for piece in pieces:
+        loop = piece.polygon.loop
+        of_edge |= dict.fromkeys(zip(loop, loop[1:] + loop[:1], strict=True), piece)
+    vertices = shape.analysis.vertices
+    seams = [e for e, p in of_edge.items() if p.polygon.normal @ of_edge[e[::-1]].polygon.normal > 0.99]
+    small = [e for e in seams if area_of(vertices[list(of_edge[e].polygon.loop)]) < 1.5]
+    assert (len(seams), len(small)) == (4, 2)
+    for edge in seams:
+        if edge in small:
+            assert_lip(shape, of_edge[edge], vertices[list(edge)])
+        else:
+            assert reach_beyond(shape, of_edge[edge], vertices[list(edge)])[0] < 1e-9
+
+
+@pytest.mark.parametrize(("sections", "degrees"), [(24, 15), (36, 10), (72, 5), (180, 3)])
+def test_lips_lie_in_the_neighbours_plane_at_blunt_edges(sections: int, degrees: float) -> None:
+    """Of a drum with a groove around it; its edges fold by 360 degrees over the number of sides."""
+    outline = [(1.0, 0.0), (1.0, 1.0), (0.8, 1.0), (0.8, 1.4), (1.0, 1.4), (1.0, 2.4)]  # radius, height
+    mesh = of_trimesh("drum", trimesh.creation.revolve([(0, 0), *outline, (0, 2.4)], sections=sections))
+    shape, pieces = lined(mesh)
+    sides = [p for p in pieces if abs(p.polygon.normal[2]) < 0.5 and np.ptp((p.vertices + p.center)[:, 2]) > 0.9]
+    assert len(sides) == 2 * sections
+    for piece in sides:
+        corners = shape.analysis.vertices[list(piece.polygon.loop)]
+        for edge in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            if abs(edge[1][2] - edge[0][2]) > 0.9:
+                assert_lip(shape, piece, np.array(edge), degrees)
+
+
+def test_the_thin_part_of_a_split_polygon_has_lips() -> None:
+    """Under the thick ones beside it, of which no lip has room over the groove."""
+    mesh = plate((1.9, 2.1), True, 4e-4)
+    shape, pieces = lined(mesh)
+    thin = [p for p in pieces if p.polygon.normal[2] > 0.99 and height(shape, p) < 1e-3]
+    assert len(thin) == 1
+    depth = height(shape, thin[0]) / 2  # of half a cell, which is less than lips have elsewhere
+    assert depth < LIP * shape.analysis.diagonal
+    assert np.ptp(thin[0].vertices[:, 0]) == pytest.approx(0.2 + 2 * depth / np.tan(np.radians(3)), rel=1e-9)
+
+
 def test_convex_components_stay_one_hull() -> None:
     shape, cells = lined(joined(box((1, 1, 1), (9, 0, 0)), channel(), box((1, 1, 1), (0, 9, 0))))
     assert len(shape.pieces) - len(cells) == 2
@@ -204,8 +284,7 @@ def test_the_note_tells_the_numbers() -> None:
     shape, cells = lined(channel())
     ratio = sum(hull_volume(p.vertices) for p in cells) / 28
     assert shape.note == (
-        f"{len(cells)} shell cells, none a thin prism, 0 tilted, thinnest {0.02 * np.sqrt(34):.3g}, "
-        f"{ratio:.3g} times the solid's volume"
+        f"{len(cells)} shell cells, none a thin prism, 0 tilted, thinnest 0.5, {ratio:.3g} times the solid's volume"
     )
 
 
