@@ -1,4 +1,4 @@
-"""How functions are compiled, without Python's lock and with multiplications fused to additions; and room to work in."""
+"""How functions are compiled, without Python's lock and with fused multiplications; and room to work in."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ _njit: Any = numba.njit
 
 # Nothing here is NaN or infinite (boxes of unused lanes are far away instead), and no sum is put in another order.
 _RELAXED = {"nnan", "nsz", "contract"}
+_PART: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, **INNER}
 
 
 def compiled(function: F) -> F:
@@ -28,17 +29,17 @@ def compiled(function: F) -> F:
     It may not make or return arrays: those that it is given, and its views of them, are not counted, because counting
     them would take longer than what is done with them.
     """
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False, **INNER)(function))
+    return cast(F, _njit(fastmath=_RELAXED, **_PART)(function))
 
 
 def inlined(function: F) -> F:
     """Compile a function as a part of those that call it: handing all tables over takes longer than what it does."""
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False, forceinline=True, **INNER)(function))
+    return cast(F, _njit(fastmath=_RELAXED, forceinline=True, **_PART)(function))
 
 
 def compiled_strictly(function: F) -> F:
     """Compile a function whose results must not depend on where it is used: each operation is rounded by itself."""
-    return cast(F, _njit(nogil=True, error_model="numpy", _nrt=False, **INNER)(function))
+    return cast(F, _njit(**_PART)(function))
 
 
 def _digest() -> int:

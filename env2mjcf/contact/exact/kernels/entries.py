@@ -64,9 +64,7 @@ def _distances(tables: Tables, floats: Any, integers: Any, q: Any, out: Any) -> 
 
 
 @compiled
-def _edges_collide(
-    tables: Tables, floats: Any, integers: Any, start: Any, delta: Any, steps: Any, out: Any
-) -> None:
+def _edges_collide(tables: Tables, floats: Any, integers: Any, start: Any, delta: Any, steps: Any, out: Any) -> None:
     room, dim = room_in(tables, floats, integers), len(tables.limits)
     for i in range(len(start)):
         out[i] = edge_collides(tables, room, row(start, i * dim), row(delta, i * dim), steps[i])
