@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from fractions import Fraction
 from pathlib import Path
 
@@ -313,3 +315,26 @@ def test_points_of_a_star_are_inside_as_algebra_says(tmp_path: Path, corners: in
     local = (points - np.mean(vertices, axis=0) - frame[:, 3]) @ frame[:, :3]
     assert [holds_point(*packed, shape, *point, stack) for point in local] == expected.tolist()
     assert 0.1 < expected.mean() < 0.7
+
+
+FALLBACK = """
+import sys
+import env2mjcf.contact.exact.kernels.linking as linking
+if sys.argv[2] == "without":
+    linking.INNER, linking.OUTER = {}, {}
+import env2mjcf
+scene = env2mjcf.load(sys.argv[1])
+print(scene.is_valid(scene.space.sample(500, seed=2)).tolist())
+"""
+
+
+@pytest.mark.slow
+def test_without_private_parts_of_numba_the_answers_are_the_same(tmp_path: Path) -> None:
+    said = []
+    for way in ("with", "without"):
+        package = Path(env2mjcf.__file__).parents[1]
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / way), "PYTHONPATH": str(package)}
+        command = [sys.executable, "-c", FALLBACK, str(MODELS / "maze/maze.env"), way]
+        said.append(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
+    assert said[0] == said[1]
+    assert "True" in said[0] and "False" in said[0]

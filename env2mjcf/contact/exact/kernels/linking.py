@@ -116,7 +116,8 @@ def _compiler(library_class: type[JITCodeLibrary], keeps_objects: bool) -> type[
 def _as_expected() -> bool:
     """Return whether numba's private parts are those that this module was written for."""
     try:
-        codegen = cpu_target.target_context.codegen()
+        target: Any = cpu_target
+        codegen = target.target_context.codegen()
         library: Any = JITCodeLibrary(codegen, "trial")
         module = codegen._create_empty_module("trial")
         _, _ = codegen._function_pass_manager(opt=_LEVEL)
@@ -128,13 +129,13 @@ def _as_expected() -> bool:
         return False
 
 
-INNER: dict[str, Any] = {}
+_UNCALLED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_USED = _as_expected()
+
+INNER: dict[str, Any] = {**_UNCALLED, "pipeline_class": _compiler(_Part, keeps_objects=False)} if _USED else {}
 """Options of numba for functions that other compiled functions call; Python cannot call them."""
 
-OUTER: dict[str, Any] = {}
+OUTER: dict[str, Any] = (
+    {"no_cfunc_wrapper": True, "pipeline_class": _compiler(_Whole, keeps_objects=True)} if _USED else {}
+)
 """Options of numba for entries."""
-
-if _as_expected():
-    _UNCALLED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    INNER = {**_UNCALLED, "pipeline_class": _compiler(_Part, keeps_objects=False)}
-    OUTER = {"no_cfunc_wrapper": True, "pipeline_class": _compiler(_Whole, keeps_objects=True)}

@@ -29,6 +29,9 @@ from numba.extending import (
 
 from ..tables import INTEGERS, WIDTHS, Tables
 
+# What it makes has other arguments than what it is made of.
+_intrinsic: Any = intrinsic
+
 _NUMBERS = {name: i for i, name in enumerate(Tables._fields)}
 
 
@@ -191,7 +194,7 @@ def _data(context: Any, builder: Any, of: Any, array: Any) -> Any:
     return context.make_array(of)(context, builder, array).data
 
 
-@intrinsic
+@_intrinsic
 def opened(typing: Any, integers: Any, floats: Any) -> Any:
     """Return the tables that lie in two arrays."""
 
@@ -204,7 +207,7 @@ def opened(typing: Any, integers: Any, floats: Any) -> Any:
     return signature(_TABLES, integers, floats), lower
 
 
-@intrinsic
+@_intrinsic
 def row(typing: Any, array: Any, start: Any) -> Any:
     """Return the numbers of an array from a place on."""
 
@@ -214,7 +217,7 @@ def row(typing: Any, array: Any, start: Any) -> Any:
     return signature(Row(array.dtype), array, types.intp), lower
 
 
-@intrinsic(prefer_literal=True)
+@_intrinsic(prefer_literal=True)
 def grid(typing: Any, array: Any, start: Any, rows: Any, width: Any) -> Any:
     """Return so many rows of an array from a place on; the width is a literal."""
     if not isinstance(width, types.IntegerLiteral):
