@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import subprocess
-from fractions import Fraction
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenes import MODELS
 
 import env2mjcf
-from env2mjcf.testing import MODELS
 
 pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
 
