@@ -201,9 +201,9 @@ def _announce() -> None:
     """
     if parent_process() is not None:
         return
-    from numba.core.event import Listener, register
+    events: Any = import_module("numba.core.event")
 
-    class Told(Listener):
+    class Told(events.Listener):
         """Says on stderr that compiling has begun, and on a terminal how far it is."""
 
         def __init__(self) -> None:
@@ -235,7 +235,7 @@ def _announce() -> None:
                     self._bar.close()
                     self._bar = None
 
-    register("numba:compile", Told())
+    events.register("numba:compile", Told())
 
 
 def call(entry: Any, *arguments: Any) -> None:

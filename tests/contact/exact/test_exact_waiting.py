@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import pty
+import shutil
 import subprocess
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,7 @@ def said(code: str, folder: Path) -> str:
 
 def said_on_terminal(code: str, folder: Path) -> str:
     ours, theirs = pty.openpty()
+    termios.tcsetwinsize(ours, (24, 80))
     with subprocess.Popen([sys.executable, "-c", code], env=environment(folder), stderr=theirs) as process:
         os.close(theirs)
         text = b""
@@ -62,10 +65,12 @@ def said_on_terminal(code: str, folder: Path) -> str:
 
 @pytest.mark.slow
 def test_a_terminal_is_told_once_and_shows_a_bar(tmp_path: Path) -> None:
-    text = said_on_terminal(ASK, tmp_path)
+    text = said_on_terminal(ASK, tmp_path / "first")
     assert text.count(LINE) == 1
     assert "compiling: " in text
-    assert said_on_terminal(ASK, tmp_path) == ""
+    # As CI keeps the folder: it comes back as a copy.
+    shutil.copytree(tmp_path / "first", tmp_path / "copy")
+    assert said_on_terminal(ASK, tmp_path / "copy") == ""
 
 
 @pytest.mark.slow
