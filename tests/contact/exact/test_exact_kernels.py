@@ -335,7 +335,7 @@ def test_without_private_parts_of_numba_the_answers_are_the_same(tmp_path: Path)
     for way in ("with", "without"):
         package = Path(env2mjcf.__file__).parents[1]
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / way), "PYTHONPATH": str(package)}
-        command = [sys.executable, "-c", FALLBACK, str(MODELS / "maze/maze.env"), way]
+        command = [sys.executable, "-c", FALLBACK, str(MODELS / "bug-trap/bug-trap.env"), way]
         said.append(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
     assert said[0] == said[1]
     assert "True" in said[0]
