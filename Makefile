@@ -20,6 +20,7 @@ help:  ## list the targets
 
 demo: $(VENV)/demo.stamp  ## convert the seed scene, let it fall, report contacts, draw a picture
 	@$(BIN)/python models/demo.py
+	$(warm)
 
 test: $(VENV)/test.stamp  ## run the quick tests; PYTEST_FLAGS="-k alpha" picks some, PYTEST_FLAGS="-m slow" the slow ones
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_FLAGS)

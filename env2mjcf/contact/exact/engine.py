@@ -10,13 +10,16 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from ...geometry.assembly import Assembly
 from ...geometry.topology import Bools
@@ -58,7 +61,7 @@ class ExactEngine:
         require()
         self._tables = scene_tables(assembly, space, pairs, surfaces)
         self._entries = entries()
-        self._collisions = self._entries.collisions
+        self._collisions, self._validities = self._entries.collisions, self._entries.validities
 
     def collisions(self, q: Array) -> Bools:
         """Return whether any pair touches, (n,), at configurations (n, dim)."""
@@ -73,7 +76,10 @@ class ExactEngine:
     def validities(self, q: Array) -> Bools:
         """Return whether configurations are within limits and the boundary, and no pair touches, (n,)."""
         out = np.empty(len(q), dtype=np.bool_)
-        call(self._entries.validities, *self._tables, _plain(q), out)
+        try:
+            self._validities(*self._tables, _plain(q), out)
+        except Exception:
+            call(self._validities, *self._tables, _plain(q), out)
         return out
 
     def distances(self, q: Array) -> Array:
@@ -171,7 +177,9 @@ def entries() -> Any:
     """
     with _loading.lock:
         try:
-            return import_module(".kernels.entries", __package__)
+            found = import_module(".kernels.entries", __package__)
+            _announce()
+            return found
         except RuntimeError as error:
             if "cannot cache" not in str(error):
                 raise
@@ -179,6 +187,55 @@ def entries() -> Any:
                 "the exact engine finds no folder to keep what it compiles: name one that may be written with "
                 "NUMBA_CACHE_DIR, or choose engine='mujoco'"
             ) from error
+
+
+# On a core of 2020, for verdicts alone; proofs, distances and edges follow when they are asked for.
+_SECONDS = 6
+
+
+@cache
+def _announce() -> None:
+    """Let whoever waits for numba be told so; nothing is said where compiled code comes from the disk.
+
+    Once in a process, and not by workers: they would all say the same.
+    """
+    if parent_process() is not None:
+        return
+    events: Any = import_module("numba.core.event")
+
+    class Told(events.Listener):
+        """Says on stderr that compiling has begun, and on a terminal how far it is."""
+
+        def __init__(self) -> None:
+            self._said = False
+            self._bar: Any = None
+            self._entry: Any = None
+
+        def on_start(self, event: Any) -> None:
+            dispatcher = event.data["dispatcher"]
+            if dispatcher.py_func.__module__ != f"{__package__}.kernels.entries" or self._entry is not None:
+                return
+            if not hasattr(dispatcher.stats, "cache_path") or dispatcher.stats.cache_path is None:
+                return  # a part of an entry
+            self._entry = dispatcher
+            if not self._said and sys.stderr is not None:
+                self._said = True
+                about = f"compiling the collision engine, once on this machine, about {_SECONDS} s"
+                sys.stderr.write(f"env2mjcf: {about}\n")
+                sys.stderr.flush()
+            if sys.stderr is not None and sys.stderr.isatty():
+                self._bar = tqdm(unit=" functions", desc="compiling", leave=False)
+
+        def on_end(self, event: Any) -> None:
+            if self._bar is not None:
+                self._bar.update()
+            if event.data["dispatcher"] is self._entry:
+                self._entry = None
+                if self._bar is not None:
+                    self._bar.close()
+                    self._bar = None
+
+    events.register("numba:compile", Told())
 
 
 def call(entry: Any, *arguments: Any) -> None:

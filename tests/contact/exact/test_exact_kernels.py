@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,11 +24,23 @@ from env2mjcf.transforms import rotation_matrix, transform
 
 pytest.importorskip("numba", reason="no numba: pip install 'env2mjcf[fast]'")
 
-from env2mjcf.contact.exact.kernels.boxes import boxes_apart, lanes_near
-from env2mjcf.contact.exact.kernels.compiling import opened
-from env2mjcf.contact.exact.kernels.separations import triangle_distance, triangle_gap
-from env2mjcf.contact.exact.kernels.touching import _LEAN_X, _LEAN_Y, holds
-from env2mjcf.contact.exact.kernels.triangles import box_meets, triangle_meets
+from kernels import from_python, holds_point, place_links, views
+
+from env2mjcf.contact.exact.kernels import boxes, separations, triangles
+from env2mjcf.contact.exact.kernels.linking import INNER
+from env2mjcf.contact.exact.kernels.touching import _LEAN_X, _LEAN_Y
+
+boxes_apart, lanes_near = from_python(boxes.boxes_apart), from_python(boxes.lanes_near)
+triangle_distance, triangle_gap = from_python(separations.triangle_distance), from_python(separations.triangle_gap)
+box_meets, triangle_meets = from_python(triangles.box_meets), from_python(triangles.triangle_meets)
+
+
+def test_python_cannot_call_what_is_only_a_part() -> None:
+    """It is not translated by itself: there is nothing to be called."""
+    if not INNER:
+        pytest.skip("this numba has other private parts: every function is translated by itself")
+    with pytest.raises(TypeError, match="not callable"):
+        boxes.lanes_about(np.zeros(48), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def block_of(triangles: np.ndarray) -> np.ndarray:
@@ -210,16 +225,14 @@ def test_trees_over_equal_boxes_are_not_deep() -> None:
 
 @pytest.mark.slow
 def test_steps_place_links_where_the_kinematics_do() -> None:
-    from env2mjcf.contact.exact.kernels.poses import place
-
     checked = 0
     for path in sorted(MODELS.glob("*/*.env")):
         scene = env2mjcf.load(path, robots=tuple(path.parent.glob("*.robot")))
         engine = scene._solver._chosen("exact")
-        tables = opened(*engine._tables)
+        tables = views(*engine._tables)
         frames = np.empty((len(tables.steps), 12))
         for q in scene.space.sample(20, seed=1):
-            place(tables, q, frames)
+            place_links(*engine._tables, q, frames)
             link = 0
             for robot, columns in zip(scene.compiled.assembly.robots, scene.space.robot_slices, strict=True):
                 motions = Motions()
@@ -244,7 +257,8 @@ def test_steps_place_links_where_the_kinematics_do() -> None:
 def test_rays_count_as_winding_numbers_do() -> None:
     """Of the bottle, from points all over it, and from points whose rays go through corners of the mesh."""
     scene = env2mjcf.load(MODELS / "bug-trap/bug-trap.env")
-    tables = opened(*scene._solver._chosen("exact")._tables)
+    packed = scene._solver._chosen("exact")._tables
+    tables = views(*packed)
     part, shape = scene.compiled.assembly.obstacles[0], int(tables.obstacles[0, 0])
     frame = tables.poses[0].reshape(3, 4)
     vertices = (part.analysis.vertices @ part.pose[:3, :3].T + part.pose[:3, 3] - frame[:, 3]) @ frame[:, :3]
@@ -254,7 +268,7 @@ def test_rays_count_as_winding_numbers_do() -> None:
     points = np.concatenate([rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (1500, 3)), below])
     expected = np.abs(winding_numbers(points, vertices, part.analysis.faces)) > 0.5
     stack = np.zeros(4096, dtype=np.int64)
-    assert [holds(tables, shape, *point, stack) for point in points] == expected.tolist()
+    assert [holds_point(*packed, shape, *point, stack) for point in points] == expected.tolist()
     assert 200 < expected.sum() < 2800
 
 
@@ -283,7 +297,8 @@ def test_points_of_a_star_are_inside_as_algebra_says(tmp_path: Path, corners: in
     star = trimesh.Trimesh(vertices, faces, process=False)
     path = write_scene(tmp_path, free_cube("star.g 0 0 0 0 0 0"), star=export_byu(star))
     scene = env2mjcf.load(path)
-    tables = opened(*scene._solver._chosen("exact")._tables)
+    packed = scene._solver._chosen("exact")._tables
+    tables = views(*packed)
     frame, shape = tables.poses[0].reshape(3, 4), int(tables.obstacles[0, 0])
     rng = np.random.default_rng(7)
     points = rng.uniform(-1, 1, (200, 3)) * [1.05, 1.05, 1.2 * height]
@@ -299,5 +314,29 @@ def test_points_of_a_star_are_inside_as_algebra_says(tmp_path: Path, corners: in
     stack = np.zeros(4096, dtype=np.int64)
     # Meshes are placed by the mean of their vertices.
     local = (points - np.mean(vertices, axis=0) - frame[:, 3]) @ frame[:, :3]
-    assert [holds(tables, shape, *point, stack) for point in local] == expected.tolist()
+    assert [holds_point(*packed, shape, *point, stack) for point in local] == expected.tolist()
     assert 0.1 < expected.mean() < 0.7
+
+
+FALLBACK = """
+import sys
+import env2mjcf.contact.exact.kernels.linking as linking
+if sys.argv[2] == "without":
+    linking.INNER, linking.OUTER = {}, {}
+import env2mjcf
+scene = env2mjcf.load(sys.argv[1])
+print(scene.is_valid(scene.space.sample(500, seed=2)).tolist())
+"""
+
+
+@pytest.mark.slow
+def test_without_private_parts_of_numba_the_answers_are_the_same(tmp_path: Path) -> None:
+    said = []
+    for way in ("with", "without"):
+        package = Path(env2mjcf.__file__).parents[1]
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / way), "PYTHONPATH": str(package)}
+        command = [sys.executable, "-c", FALLBACK, str(MODELS / "bug-trap/bug-trap.env"), way]
+        said.append(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
+    assert said[0] == said[1]
+    assert "True" in said[0]
+    assert "False" in said[0]

@@ -1,7 +1,4 @@
-"""How functions are compiled, without Python's lock and with multiplications fused to additions; and what they work on.
-
-That is views of the tables that `tables.packed` has put one after the other, and room to work in.
-"""
+"""How functions are compiled, without Python's lock and with fused multiplications; and room to work in."""
 
 from __future__ import annotations
 
@@ -11,9 +8,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
-import numpy as np
 
-from ..tables import WIDTHS, Tables
+from ..tables import Tables
+from .linking import INNER, OUTER
+from .pointers import grid, row
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,6 +20,7 @@ _njit: Any = numba.njit
 
 # Nothing here is NaN or infinite (boxes of unused lanes are far away instead), and no sum is put in another order.
 _RELAXED = {"nnan", "nsz", "contract"}
+_PART: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, **INNER}
 
 
 def compiled(function: F) -> F:
@@ -30,22 +29,17 @@ def compiled(function: F) -> F:
     It may not make or return arrays: those that it is given, and its views of them, are not counted, because counting
     them would take longer than what is done with them.
     """
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False)(function))
+    return cast(F, _njit(fastmath=_RELAXED, **_PART)(function))
 
 
 def inlined(function: F) -> F:
     """Compile a function as a part of those that call it: handing all tables over takes longer than what it does."""
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", _nrt=False, forceinline=True)(function))
+    return cast(F, _njit(fastmath=_RELAXED, forceinline=True, **_PART)(function))
 
 
 def compiled_strictly(function: F) -> F:
     """Compile a function whose results must not depend on where it is used: each operation is rounded by itself."""
-    return cast(F, _njit(nogil=True, error_model="numpy", _nrt=False)(function))
-
-
-def compiled_with_arrays(function: F) -> F:
-    """Compile a function that makes or returns arrays."""
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy")(function))
+    return cast(F, _njit(**_PART)(function))
 
 
 def _digest() -> int:
@@ -66,42 +60,11 @@ function are part of what it looks an entry up by.
 
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep it on disk."""
-    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", cache=True)(function))
-
-
-@compiled_with_arrays
-def _view(array: Any, integers: Any, table: int) -> Any:
-    start, rows, width = integers[2 * table], integers[2 * table + 1], WIDTHS[table]
-    return array[start : start + rows * width].reshape(rows, width)
-
-
-@compiled_with_arrays
-def opened(integers: Any, floats: Any) -> Tables:
-    """Return views of all tables."""
-    return Tables(
-        _view(integers, integers, 0),
-        _view(integers, integers, 1),
-        _view(integers, integers, 2),
-        _view(integers, integers, 3),
-        _view(integers, integers, 4),
-        _view(integers, integers, 5),
-        _view(integers, integers, 6),
-        _view(integers, integers, 7),
-        _view(floats, integers, 8),
-        _view(floats, integers, 9),
-        _view(floats, integers, 10),
-        _view(floats, integers, 11),
-        _view(floats, integers, 12),
-        _view(floats, integers, 13),
-        _view(floats, integers, 14),
-        _view(floats, integers, 15),
-        _view(floats, integers, 16),
-        _view(floats, integers, 17),
-    )
+    return cast(F, _njit(nogil=True, fastmath=_RELAXED, error_model="numpy", cache=True, **OUTER)(function))
 
 
 class Room(NamedTuple):
-    """Arrays that compiled code works in, one set for each thread.
+    """Where compiled code works, one for each thread.
 
     Attributes:
         q: (dim,) a configuration.
@@ -120,28 +83,28 @@ class Room(NamedTuple):
     gaps: Any
 
 
-@compiled_with_arrays
-def room_for_verdicts(tables: Tables) -> Room:
-    """Return room for looking at configurations one by one, without that for edges and distances: it is made sooner."""
-    nothing = np.empty(0)
-    return Room(
-        nothing,
-        np.empty((len(tables.steps), 12)),
-        np.empty((len(tables.links), 3)),
-        np.empty(tables.counts[0, 1], dtype=np.int64),
-        np.empty(tables.counts[0, 2], dtype=np.int64),
-        nothing,
-    )
+@compiled
+def floats_of_room(tables: Tables) -> int:
+    """Return how many floats room for verdicts takes; for distances and edges, `counts[0, 2]` more."""
+    return len(tables.limits) + 12 * len(tables.steps) + 3 * len(tables.links)
 
 
-@compiled_with_arrays
-def room(tables: Tables) -> Room:
-    """Return room to work in."""
+@compiled
+def integers_of_room(tables: Tables) -> int:
+    """Return how many integers room takes."""
+    return tables.counts[0, 1] + tables.counts[0, 2]
+
+
+@compiled
+def room_in(tables: Tables, floats: Any, integers: Any) -> Room:
+    """Return room in two arrays, which must live as long."""
+    frames = len(tables.limits)
+    spans = frames + 12 * len(tables.steps)
     return Room(
-        np.empty(len(tables.limits)),
-        np.empty((len(tables.steps), 12)),
-        np.empty((len(tables.links), 3)),
-        np.empty(tables.counts[0, 1], dtype=np.int64),
-        np.empty(tables.counts[0, 2], dtype=np.int64),
-        np.empty(tables.counts[0, 2]),
+        row(floats, 0),
+        grid(floats, frames, len(tables.steps), 12),
+        grid(floats, spans, len(tables.links), 3),
+        row(integers, 0),
+        row(integers, tables.counts[0, 1]),
+        row(floats, floats_of_room(tables)),
     )

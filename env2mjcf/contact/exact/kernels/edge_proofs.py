@@ -46,9 +46,9 @@ def edge_is_free(
         if collides_at(tables, room, start, delta, (3 * i % 5) / 4):
             return False
     fastest = 0.0
-    for i in range(len(speeds)):
+    for i in range(len(tables.links)):
         fastest = max(fastest, speeds[i])
-    for i in range(len(pair_speeds)):
+    for i in range(len(tables.pairs)):
         fastest = max(fastest, pair_speeds[i])
     if fastest == 0.0:
         return True
@@ -225,7 +225,7 @@ def collides_at(tables: Tables, room: Room, start: Any, delta: Any, t: float) ->
 def place_at(tables: Tables, room: Room, start: Any, delta: Any, t: float) -> None:
     """Place the robots at a time of a way."""
     q = room.q
-    for i in range(len(q)):
+    for i in range(len(tables.limits)):
         q[i] = start[i] + t * delta[i]
     place(tables, q, room.frames)
     measure(tables, room)

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..tables import FIRST_VERTEX, LAST_VERTEX, STEP, BoundaryKind, Tables
-from .compiling import SOURCES, Room, compiled, entry, opened, room, room_for_verdicts
+from .compiling import SOURCES, Room, compiled, entry, floats_of_room, integers_of_room, room_in
 from .distances import least_distance
 from .edge_proofs import LEVELS, edge_collides, edge_is_free
+from .pointers import grid, opened, row
 from .poses import place
 from .touching import collides, measure
 
@@ -30,27 +31,31 @@ _NONE, _BOX = int(BoundaryKind.NONE), int(BoundaryKind.BOX)
 
 
 @compiled
-def _collisions(tables: Tables, room: Room, q: Any, out: Any) -> None:
+def _collisions(tables: Tables, floats: Any, integers: Any, q: Any, out: Any) -> None:
+    room, dim = room_in(tables, floats, integers), len(tables.limits)
     for i in range(len(q)):
-        place(tables, q[i], room.frames)
+        place(tables, row(q, i * dim), room.frames)
         measure(tables, room)
         out[i] = collides(tables, room)
 
 
 @compiled
-def _validities(tables: Tables, room: Room, q: Any, out: Any) -> None:
+def _validities(tables: Tables, floats: Any, integers: Any, q: Any, out: Any) -> None:
+    room, dim = room_in(tables, floats, integers), len(tables.limits)
     for i in range(len(q)):
-        out[i] = within_limits(tables, q[i])
+        at = row(q, i * dim)
+        out[i] = within_limits(tables, at)
         if out[i]:
-            place(tables, q[i], room.frames)
+            place(tables, at, room.frames)
             measure(tables, room)
             out[i] = within_boundary(tables, room) and not collides(tables, room)
 
 
 @compiled
-def _distances(tables: Tables, room: Room, q: Any, out: Any) -> None:
+def _distances(tables: Tables, floats: Any, integers: Any, q: Any, out: Any) -> None:
+    room, dim = room_in(tables, floats, integers), len(tables.limits)
     for i in range(len(q)):
-        place(tables, q[i], room.frames)
+        place(tables, row(q, i * dim), room.frames)
         measure(tables, room)
         out[i] = -1.0
         if not collides(tables, room):
@@ -59,47 +64,57 @@ def _distances(tables: Tables, room: Room, q: Any, out: Any) -> None:
 
 
 @compiled
-def _edges_collide(tables: Tables, room: Room, start: Any, delta: Any, steps: Any, out: Any) -> None:
+def _edges_collide(tables: Tables, floats: Any, integers: Any, start: Any, delta: Any, steps: Any, out: Any) -> None:
+    room, dim = room_in(tables, floats, integers), len(tables.limits)
     for i in range(len(start)):
-        out[i] = edge_collides(tables, room, start[i], delta[i], steps[i])
+        out[i] = edge_collides(tables, room, row(start, i * dim), row(delta, i * dim), steps[i])
 
 
 @compiled
 def _edges_are_free(
-    tables: Tables, room: Room, start: Any, delta: Any, speeds: Any, drifts: Any, turns: Any, pair_speeds: Any,
-    band: float, stretches: Any, runs: Any, pending: Any, out: Any,
+    tables: Tables, floats: Any, integers: Any, start: Any, delta: Any, speeds: Any, drifts: Any, turns: Any,
+    pair_speeds: Any, band: float, stretches: Any, runs: Any, pending: Any, out: Any,
 ) -> None:  # fmt: skip
+    room, dim = room_in(tables, floats, integers), len(tables.limits)
+    links, pairs = len(tables.links), len(tables.pairs)
     for i in range(len(start)):
-        a, d = start[i], delta[i]
         out[i] = edge_is_free(
-            tables, room, a, d, speeds[i], drifts[i], turns[i], pair_speeds[i], band, stretches, runs, pending
-        )
+            tables, room, row(start, i * dim), row(delta, i * dim),
+            row(speeds, i * links), grid(drifts, i * 3 * links, links, 3), row(turns, i * links),
+            row(pair_speeds, i * pairs), band,
+            grid(stretches, 0, 2 * LEVELS, 2), grid(runs, 0, 2 * LEVELS, 2), row(pending, 0),
+        )  # fmt: skip
 
 
 def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
+    # Each makes its room itself: what is behind a pointer must be an argument where it is used.
     @entry
     def collisions(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _collisions(tables, room_for_verdicts(tables), q, out)
+        f, i = np.empty(floats_of_room(tables)), np.empty(integers_of_room(tables), np.int64)
+        _collisions(tables, f, i, q, out)
 
     @entry
     def validities(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _validities(tables, room_for_verdicts(tables), q, out)
+        f, i = np.empty(floats_of_room(tables)), np.empty(integers_of_room(tables), np.int64)
+        _validities(tables, f, i, q, out)
 
     @entry
     def distances(integers: Any, floats: Any, q: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _distances(tables, room(tables), q, out)
+        f, i = np.empty(floats_of_room(tables) + tables.counts[0, 2]), np.empty(integers_of_room(tables), np.int64)
+        _distances(tables, f, i, q, out)
 
     @entry
     def edges_collide(integers: Any, floats: Any, start: Any, delta: Any, steps: Any, out: Any) -> None:
         _ = sources
         tables = opened(integers, floats)
-        _edges_collide(tables, room(tables), start, delta, steps, out)
+        f, i = np.empty(floats_of_room(tables)), np.empty(integers_of_room(tables), np.int64)
+        _edges_collide(tables, f, i, start, delta, steps, out)
 
     @entry
     def edges_are_free(
@@ -108,11 +123,12 @@ def _entries(sources: int) -> tuple[Entry, Entry, Entry, Entry, Entry]:
     ) -> None:  # fmt: skip
         _ = sources
         tables = opened(integers, floats)
-        stretches, runs = np.empty((2 * LEVELS, 2)), np.empty((2 * LEVELS, 2), dtype=np.int64)
+        f, i = np.empty(floats_of_room(tables) + tables.counts[0, 2]), np.empty(integers_of_room(tables), np.int64)
+        stretches, runs = np.empty(4 * LEVELS), np.empty(4 * LEVELS, dtype=np.int64)
         # As many lists as levels, each of all pairs at the most.
         pending = np.empty((LEVELS + 1) * (len(tables.links) * len(tables.obstacles) + len(tables.pairs)), np.int64)
         _edges_are_free(
-            tables, room(tables), start, delta, speeds, drifts, turns, pair_speeds, band, stretches, runs, pending, out
+            tables, f, i, start, delta, speeds, drifts, turns, pair_speeds, band, stretches, runs, pending, out
         )
 
     return collisions, validities, distances, edges_collide, edges_are_free
@@ -124,7 +140,7 @@ collisions, validities, distances, edges_collide, edges_are_free = _entries(SOUR
 @compiled
 def within_limits(tables: Tables, q: Any) -> bool:
     """Return whether a configuration, (dim,), keeps the limits of its joints."""
-    for i in range(len(q)):
+    for i in range(len(tables.limits)):
         if q[i] < tables.limits[i, 0] or q[i] > tables.limits[i, 1]:
             return False
     return True
