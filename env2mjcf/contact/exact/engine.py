@@ -199,8 +199,6 @@ def _announce() -> None:
 
     Once in a process, and not by workers: they would all say the same.
     """
-    if parent_process() is not None:
-        return
     events: Any = import_module("numba.core.event")
 
     class Told(events.Listener):
@@ -212,6 +210,8 @@ def _announce() -> None:
             self._entry: Any = None
 
         def on_start(self, event: Any) -> None:
+            if parent_process() is not None:  # asked here, because a worker may be forked with this listener
+                return
             dispatcher = event.data["dispatcher"]
             if dispatcher.py_func.__module__ != f"{__package__}.kernels.entries" or self._entry is not None:
                 return

@@ -31,6 +31,8 @@ import multiprocessing
 def ask():
     exec({ASK!r})
 if __name__ == "__main__":
+    from env2mjcf.contact.exact.engine import entries
+    entries()  # what the parent has made ready is forked, too
     worker = multiprocessing.get_context("fork").Process(target=ask)
     worker.start()
     worker.join()
