@@ -40,6 +40,7 @@ CHANGING = {
     "env2mjcf.contact.executors._parcels": "scenes as bytes, while the scenes live",
     "env2mjcf.system.locks._locks": "all locks, while they live: a forked child opens them",
     "env2mjcf.contact.exact.engine._loading": "held while numba is imported or compiles",
+    "env2mjcf.contact.exact.engine._announce": "a cache: a process says once that it compiles",
     "env2mjcf.planning.route._one_at_a_time": "held while OMPL plans: its random numbers are the process's",
     "env2mjcf.geometry.store._provenance": "a cache: the digest of the geometry code",
     "env2mjcf.geometry.mesh._READERS": "readers of meshes by file ending; filled on import",

@@ -61,9 +61,6 @@ class _TablesType(types.Type):
         super().__init__(name="Tables")
 
 
-_TABLES = _TablesType()
-
-
 @register_model(Row)
 class _RowModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, of: Any) -> None:
@@ -199,12 +196,12 @@ def opened(typing: Any, integers: Any, floats: Any) -> Any:
     """Return the tables that lie in two arrays."""
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        tables = cgutils.create_struct_proxy(_TABLES)(context, builder)
+        tables = cgutils.create_struct_proxy(_TablesType())(context, builder)
         tables.integers = _data(context, builder, sig.args[0], args[0])
         tables.floats = _data(context, builder, sig.args[1], args[1])
         return tables._getvalue()
 
-    return signature(_TABLES, integers, floats), lower
+    return signature(_TablesType(), integers, floats), lower
 
 
 @_intrinsic
