@@ -60,8 +60,8 @@ def test_everything_has_an_oldest_version(project: dict[str, Any]) -> None:
 
 def test_nothing_is_imported_that_is_not_required(project: dict[str, Any]) -> None:
     required = set(bounds(runtime(project)))
-    # Dask's extra `distributed` is the package of that name; the plugin of pytest is imported by pytest alone; llvmlite is
-    # what numba is built on, in the version that it asks for.
+    # Dask's extra `distributed` is the package of that name; the plugin of pytest is imported by pytest alone; numba is
+    # built on llvmlite, and asks for its version.
     required |= {"distributed", "pytest", "llvmlite"}
     owners = packages_distributions()
     for path in sorted((ROOT / "env2mjcf").rglob("*.py")):
