@@ -25,13 +25,14 @@ import env2mjcf
 
 MODELS = Path(__file__).parents[1] / "models"
 ROLLOUTS, STEPS, COMPARED = 64, 200, 500
+SPEED = 0.1  # standard deviation of each speed, m/s or rad/s
 PATIENCE = 120  # seconds
 
 LEGEND = """
 Made by `python benchmarks/rollouts.py --other PYTHON`. {rollouts} simulations of {steps} steps from the scene's first
 keyframe, with speeds at random: one after the other by `mj_step` from Python, and by `mujoco.rollout` with one thread
-and with {cores}. Warp: by how much any number of qpos differs from MuJoCo's after {compared} steps from the first
-keyframe, on Warp's CPU device, in single precision.
+and with {cores}. Warp: by how much any number of qpos differs from MuJoCo's after {compared} steps of the first of
+these simulations, on Warp's CPU device, in single precision.
 """.strip()
 
 # Runs in the other Python; prints what it found, null where the scene is refused or takes too long.
@@ -42,7 +43,9 @@ import warp as wp
 wp.config.quiet = True
 import mujoco_warp as mjw
 model = mujoco.MjModel.from_xml_path(sys.argv[1]); data = mujoco.MjData(model)
-mujoco.mj_resetDataKeyframe(model, data, 0); mujoco.mj_forward(model, data)
+mujoco.mj_resetDataKeyframe(model, data, 0)
+data.qvel[:] = np.random.default_rng(0).normal(0, float(sys.argv[3]), model.nv)
+mujoco.mj_forward(model, data)
 m, d = mjw.put_model(model), mjw.put_data(model, data, nconmax=4096, njmax=8192)
 for _ in range(int(sys.argv[2])):
     mjw.step(m, d); mujoco.mj_step(model, data)
@@ -86,7 +89,7 @@ def _row(name: str, file: Path, other: str | None) -> tuple[str, ...]:
     mujoco.mj_resetDataKeyframe(model, data, 0)
     states = []
     for _ in range(ROLLOUTS):
-        data.qvel[:] = rng.normal(0, 0.1, model.nv)
+        data.qvel[:] = rng.normal(0, SPEED, model.nv)
         state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         states.append(state)
@@ -114,7 +117,11 @@ def _row(name: str, file: Path, other: str | None) -> tuple[str, ...]:
 def _differs(python: str, xml: Path) -> str:
     try:
         run = subprocess.run(
-            [python, "-c", WARP, str(xml), str(COMPARED)], capture_output=True, text=True, timeout=PATIENCE, check=True
+            [python, "-c", WARP, str(xml), str(COMPARED), str(SPEED)],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
         )
         return f"{json.loads(run.stdout.splitlines()[-1]):.0e}"
     except subprocess.TimeoutExpired:
