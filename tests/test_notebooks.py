@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from env2mjcf.contact.exact import engine
 from env2mjcf.view import offscreen
 
 nbformat = pytest.importorskip("nbformat", reason="notebooks need nbformat")
@@ -53,6 +54,9 @@ def executed(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     from jupyter_client.manager import AsyncKernelManager
     from nbclient import NotebookClient
 
+    # Else the first notebook that asks would show that it waits for the compiler.
+    if engine.available():
+        engine.compile_all()
     paths = [str(PROJECT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(p for p in paths if p))
     # As a server sets it: pictures of plots go into the notebook.
