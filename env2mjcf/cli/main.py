@@ -35,7 +35,7 @@ VERBS = {
     "view": ("view", "View", "show a scene on a web page: sliders, live contacts, paths that play"),
     "plan": ("plan", "Plan", "find a way from start to goal, prove it, and write it as a path"),
     "translate": ("translate", "Translate", "write a scene in another dialect of the format"),
-    "cache": ("cache", "Cache", "say what the geometry cache holds, empty it, or compile the engine"),
+    "cache": ("cache", "Cache", "say what is kept between runs, remove it, or compile the engine"),
 }
 
 _HELP = f"""\

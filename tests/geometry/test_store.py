@@ -22,6 +22,7 @@ from scenes import MODELS
 
 import env2mjcf
 from env2mjcf.cli.main import main
+from env2mjcf.contact.exact import engine
 from env2mjcf.diagnostics import DiagnosticLog
 from env2mjcf.geometry import shapes
 from env2mjcf.geometry.analysis import analyse
@@ -316,7 +317,8 @@ def test_a_conversion_survives_a_cache_that_cannot_be_written(tmp_path, monkeypa
 
 
 class TestVerb:
-    def test_info_and_clear(self, folder, capsys):
+    def test_info_and_clear(self, folder, capsys, monkeypatch):
+        monkeypatch.setattr(engine, "kept_files", lambda: (None, []))  # other tests need the compiled code
         env2mjcf.load(BUG_TRAP)
         size = sum(p.stat().st_size for p in entries(folder))
         assert main(["cache", "info", "--json"]) == 0
@@ -326,12 +328,17 @@ class TestVerb:
         assert (
             capsys.readouterr().out
             == f"folder  {folder}\nholds   2 entries, {size / 2**20:.1f} MiB\nlimit   1024 MiB\n"
+            "engine  0 compiled functions, 0.0 MiB\nkept    nowhere: numba is not installed, or has no folder\n"
         )
         assert main(["cache", "clear"]) == 0
         assert f"removed 2 entries, {size / 2**20:.1f} MiB from {folder}" in capsys.readouterr().out
         assert entries(folder) == []
         assert main(["cache", "clear", "--json"]) == 0
-        assert json.loads(capsys.readouterr().out) == {"folder": str(folder), "removed": 0}
+        assert json.loads(capsys.readouterr().out) == {
+            "folder": str(folder),
+            "removed": 0,
+            "compiled": {"folder": None, "functions": 0, "bytes": 0},
+        }
 
     def test_a_cache_that_is_not_there_is_empty(self, folder, capsys):
         assert main(["cache", "info", "--json"]) == 0

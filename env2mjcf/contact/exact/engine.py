@@ -127,6 +127,7 @@ def compile_all() -> float:
     """
     start = time.perf_counter()
     kernels, tables = entries(), packed(Tables(*(np.zeros(0) for _ in WIDTHS))._replace(counts=np.zeros(3)))
+    _announce().seconds = _SECONDS_OF_ALL
     rows, answers, floats = np.zeros((0, 0)), np.zeros(0, dtype=np.bool_), np.zeros(0)
     for kernel, out in ((kernels.collisions, answers), (kernels.validities, answers), (kernels.distances, floats)):
         call(kernel, *tables, rows, out)
@@ -189,15 +190,19 @@ def entries() -> Any:
             ) from error
 
 
-# On a core of 2020, for verdicts alone; proofs, distances and edges follow when they are asked for.
-_SECONDS = 6
+# On a core of 2020: for verdicts alone, after which proofs, distances and edges follow when they are asked for; and for
+# everything.
+_SECONDS, _SECONDS_OF_ALL = 6, 15
 
 
 @cache
-def _announce() -> None:
+def _announce() -> Any:
     """Let whoever waits for numba be told so; nothing is said where compiled code comes from the disk.
 
     Once in a process, and not by workers: they would all say the same.
+
+    Returns:
+        The listener, whose `seconds` are how long it says that it takes.
     """
     events: Any = import_module("numba.core.event")
 
@@ -205,6 +210,7 @@ def _announce() -> None:
         """Says on stderr that compiling has begun, and on a terminal how far it is."""
 
         def __init__(self) -> None:
+            self.seconds = _SECONDS
             self._said = False
             self._bar: Any = None
             self._entry: Any = None
@@ -220,7 +226,7 @@ def _announce() -> None:
             self._entry = dispatcher
             if not self._said and sys.stderr is not None:
                 self._said = True
-                about = f"compiling the collision engine, once on this machine, about {_SECONDS} s"
+                about = f"compiling the collision engine, once on this machine, about {self.seconds} s"
                 sys.stderr.write(f"env2mjcf: {about}\n")
                 sys.stderr.flush()
             if sys.stderr is not None and sys.stderr.isatty():
@@ -235,7 +241,9 @@ def _announce() -> None:
                     self._bar.close()
                     self._bar = None
 
-    events.register("numba:compile", Told())
+    told = Told()
+    events.register("numba:compile", told)
+    return told
 
 
 def call(entry: Any, *arguments: Any) -> None:
@@ -253,3 +261,18 @@ def call(entry: Any, *arguments: Any) -> None:
         for file in kept:
             file.unlink(missing_ok=True)
         entry(*arguments)
+
+
+def kept_files() -> tuple[Path | None, list[Path]]:
+    """Return where numba keeps what it compiles, and the files there that are of the engine, of older sources, too.
+
+    The folder is None where nothing is kept: numba is not installed, or finds no folder.
+    """
+    if not available():
+        return None, []
+    try:
+        path = entries().collisions.stats.cache_path
+    except ValueError:
+        return None, []
+    # Beside the package the folder is Python's own __pycache__.
+    return (Path(path), sorted(Path(path).glob("entries.*.nb[ci]"))) if path else (None, [])
