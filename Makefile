@@ -75,7 +75,6 @@ $(VENV)/dev.stamp: pyproject.toml
 	@touch $(patsubst %,$(VENV)/%.stamp,demo docs lint test) $@
 
 define warm
-	@echo "compiling the exact engine, once" >&2
 	@$(BIN)/env2mjcf cache warm >&2
 endef
 

@@ -69,7 +69,8 @@ def compile_mjcf(
     compilation = Compilation(assembly, space, options, excluded_obstacles(pairs), damped)
     compilation.assets.plan([p.mesh for p in assembly.parts()])
     root = etree.Element("mujoco", model=plain(environment.name))
-    add_settings(root, assembly, pairs, options, step, speed, damped=bool(damped))
+    chosen = integrator(assembly, damped=bool(damped))
+    add_settings(root, assembly, pairs, options, step, speed, chosen)
     asset = add(root, "asset")
     add_sky(asset)
     world = add(root, "worldbody")
@@ -87,7 +88,7 @@ def compile_mjcf(
     if options.sensors:
         add_sensors(root, space)
     _report_unused(assembly, options, log)
-    report_contacts(assembly, pairs, step, 4 if integrator(assembly, damped=bool(damped)) == "RK4" else 1, log)
+    report_contacts(assembly, pairs, step, 4 if chosen == "RK4" else 1, log)
     _add_keyframes(root, space, keys, driven if options.actuators == "position" else {})
     text = to_text(root)
     return Document(

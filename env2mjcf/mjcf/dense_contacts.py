@@ -31,11 +31,14 @@ _QUICKER = (
 
 def possible_contacts(assembly: Assembly, pairs: PairTable) -> NDArray[np.int64]:
     """Return how many contacts each tested pair of bodies can have in MuJoCo, about and at most, (npairs,)."""
-    # A box that stands for a body is one piece of it, too.
-    cells = {p.name: len(p.shape.pieces) if p.shape else 0 for p in assembly.parts()}
-    both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
-    a, b = both.T
+    a, b = _pieces(assembly, pairs).T
     return np.minimum(_CONTACTS_OF_CELLS * a * b, _CONTACTS_OF_SHELLS * np.maximum(a, b))
+
+
+def _pieces(assembly: Assembly, pairs: PairTable) -> NDArray[np.int64]:
+    """Return of how many pieces both bodies of each tested pair are, (npairs, 2); a box for a body is one, too."""
+    pieces = {p.name: len(p.shape.pieces) if p.shape else 0 for p in assembly.parts()}
+    return np.array([(pieces[p.link], pieces[p.other]) for p in pairs.tested], dtype=np.int64).reshape(-1, 2)
 
 
 def memory(assembly: Assembly, pairs: PairTable) -> int:
@@ -78,8 +81,7 @@ def report_contacts(assembly: Assembly, pairs: PairTable, step: float, looks: in
     possible = possible_contacts(assembly, pairs)
     if not len(possible):
         return
-    cells = {p.name: len(p.shape.pieces) if p.shape else 0 for p in assembly.parts()}
-    both = np.array([(cells[p.link], cells[p.other]) for p in pairs.tested], dtype=np.int64)
+    both = _pieces(assembly, pairs)
     at_random = np.minimum(_CONTACTS_AT_RANDOM * np.sqrt(both.prod(axis=1)), possible)
     worst = int(np.argmax(at_random))
     seconds = looks * _SECONDS_OF_CONTACT * at_random

@@ -82,14 +82,7 @@ def _thickness(part: Part) -> float:
 
 
 def add_settings(
-    root: Element,
-    assembly: Assembly,
-    pairs: PairTable,
-    options: Options,
-    step: float,
-    speed: float | None,
-    *,
-    damped: bool,
+    root: Element, assembly: Assembly, pairs: PairTable, options: Options, step: float, speed: float | None, chosen: str
 ) -> None:
     """Append compiler settings, options, statistics, visual settings and defaults.
 
@@ -100,11 +93,10 @@ def add_settings(
         options: Those of the conversion.
         step: Time step, seconds.
         speed: What `wall_speed` returns.
-        damped: Whether the joints have damping.
+        chosen: The integrator.
     """
     add(root, "compiler", angle="radian", autolimits="true", meshdir=ASSET_FOLDER)
     gravity = options.acceleration(gravity_of_file(assembly.environment))
-    chosen = integrator(assembly, damped=damped)
     why = (
         "RK4: undamped joints keep their energy to a thousandth in a minute; with the implicit ones they gain percents."
         if chosen == "RK4"

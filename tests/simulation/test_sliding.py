@@ -25,11 +25,11 @@ def test_a_step_of_a_millimetre_is_felt() -> None:
 @pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("name", SLIDERS)
 def test_no_slide_loses_what_a_flat_face_would_not_take(name: str, noise: float) -> None:
-    """A thousandth where nothing rubs; half a percent of the way with friction, where bodies lean into seams."""
+    """A thousandth where nothing rubs; three thousandths of the way with friction, where bodies lean into seams."""
     slides = [s for s in all_slides() if (s.name, s.noise) == (name, noise) and "both" not in s.kind]
     assert len(slides) == 12
     for slide in slides:
-        assert slide.lost() < (5e-3 if "friction" in slide.kind.split() else 1e-3), slide
+        assert slide.lost() < (3e-3 if "friction" in slide.kind.split() else 1e-3), slide
 
 
 @pytest.mark.slow
@@ -39,5 +39,5 @@ def test_a_robot_that_slides_over_another_keeps_its_speed(noise: float) -> None:
     slides = [s for s in all_slides() if s.noise == noise and s.kind.startswith("both move")]
     assert len(slides) == 36
     for slide in slides:
-        expected = 1e-3 if slide.kind == "both move, plate first" else 1e-2 if noise < 1e-4 else 1e-1
+        expected = 1e-3 if slide.kind == "both move, plate first" else 1e-2 if noise < 1e-4 else 2e-2
         assert slide.lost() < expected, slide

@@ -1,6 +1,6 @@
 """Bodies that slide over plates made of many polygons, in plain MuJoCo: what they lose at the seams between cells.
 
-As a program, prints how many of all slides lose how much, a minute: `python tests/support/slides.py [SLIDER ...]`.
+As a program, prints how many of all slides lose how much, two minutes: `python tests/support/slides.py [SLIDER ...]`.
 """
 
 from __future__ import annotations

@@ -76,6 +76,7 @@ class ExactEngine:
     def validities(self, q: Array) -> Bools:
         """Return whether configurations are within limits and the boundary, and no pair touches, (n,)."""
         out = np.empty(len(q), dtype=np.bool_)
+        # As above.
         try:
             self._validities(*self._tables, _plain(q), out)
         except Exception:
