@@ -195,6 +195,7 @@ class TestPlugin:
 
     @needs_gl
     @needs("view")
+    @pytest.mark.slow
     def test_draws_failures_into_a_folder(self, run, pytester):
         result = run("--env2mjcf-pictures", "drawn", "-k", "finds")
         (picture,) = (pytester.path / "drawn").iterdir()

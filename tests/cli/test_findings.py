@@ -67,6 +67,7 @@ def test_a_body_too_far_away_to_be_computed_with_is_refused_at_its_line(text: st
     assert caught.value.diagnostic.span.line == line
 
 
+@pytest.mark.slow
 def test_a_warning_of_mujoco_s_is_one_of_python_s_and_in_no_file(tmp_path: Path) -> None:
     write_scene(tmp_path, STRETCHED)
 

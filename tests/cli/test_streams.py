@@ -70,6 +70,7 @@ def test_with_stdout_closed_a_verb_works_and_keeps_its_status(words: str, scenes
     assert run(words, scenes, closed(1))[:2] == (CASES[words], "")
 
 
+@pytest.mark.slow
 def test_what_is_written_does_not_go_into_the_place_of_a_closed_stream(scenes: Path) -> None:
     run("convert scene.env out", scenes)
     whole = {p.name: p.read_bytes() for p in (scenes / "out").rglob("*.*")}

@@ -218,6 +218,7 @@ class TestMemory:
         assert (forces, warned) == (4 * contacts, 0)
         assert not list(folder.rglob("MUJOCO_LOG.TXT"))
 
+    @pytest.mark.slow
     def test_no_more_is_asked_for_than_is_sane(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(dense_contacts, "MOST_MEMORY", 20 << 20)
         scene = env2mjcf.load(write_scene(folder, star(80)), engine="mujoco")

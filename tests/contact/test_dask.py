@@ -55,6 +55,7 @@ def pids(client: Any) -> set[int]:
     return set(client.run(os.getpid).values())
 
 
+@pytest.mark.slow
 def test_every_query_has_the_answers_of_one_thread(client: Any, scene: env2mjcf.Scene) -> None:
     executor, q = client.get_executor(), near(scene, 4000)
     few, to = q[:60], q[60:120]

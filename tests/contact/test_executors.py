@@ -260,6 +260,7 @@ def test_an_error_in_a_worker_is_raised_here(cubes: env2mjcf.Scene, executor: Ex
         cubes.in_collision(near(cubes, 10), executor=executor, threads=0)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_threads_within_a_second(tmp_path: Path) -> None:
     path = write_scene(tmp_path, free_cube("2 0 0 0 0 0", "-2 0 0 0 0 0"))
     program = textwrap.dedent(

@@ -64,6 +64,7 @@ class TestParts:
         assert [p.vertices.tobytes() for p in kept.pieces] == [p.vertices.tobytes() for p in built.pieces]
         assert (kept.strategy, kept.note, len(kept.pieces)) == ("coacd", "3 convex parts by CoACD, approximately", 3)
 
+    @pytest.mark.slow
     def test_a_scene_converts_and_says_what_is_claimed_and_missed(self, tmp_path):
         result = env2mjcf.convert(ALPHA, tmp_path / "out", collision="coacd")
         (mesh,) = {m.file: m for m in result.report.meshes}.values()

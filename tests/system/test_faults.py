@@ -139,6 +139,7 @@ class TestKilled:
 
 
 class TestFailing:
+    @pytest.mark.slow
     def test_whatever_fails_the_old_scene_stays_or_the_new_one_is_there(
         self, scenes: tuple[Path, Path], references: list[Content], out: Path, tmp_path: Path
     ) -> None:

@@ -226,6 +226,7 @@ def test_play_says_what_touches_when(cubes: env2mjcf.Scene, tmp_path: Path) -> N
 
 @needs_gl
 @needs_view
+@pytest.mark.slow
 def test_render_draws_a_query_a_trail_and_contacts(cubes: env2mjcf.Scene, tmp_path: Path) -> None:
     write_scene(tmp_path, free_cube("0 2.5 0 0 0 0"))
     write_path(cubes, PATH, tmp_path / "a.path")

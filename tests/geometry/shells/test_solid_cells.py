@@ -337,6 +337,7 @@ def test_the_same_mesh_gives_the_same_bytes() -> None:
         assert p.center.tobytes() == q.center.tobytes()
 
 
+@pytest.mark.slow
 def test_five_thousand_triangles_take_a_few_seconds() -> None:
     mesh = bumpy(4, 0.05)
     assert len(mesh.faces) == 5120
